@@ -1,0 +1,151 @@
+"""Settings that the core needs, as plain frozen values; settings.py fills them from files."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True, slots=True)
+class ActuatorConfig:
+    """One actuator: how the lever names it and how it moves.
+
+    Attributes:
+        name: as in the site file and in ``predicted_displacement``.
+        axis: index of its joystick axis.
+        sign: +1 if a positive axis lengthens / turns it positive, else -1.
+        max_velocity: [unit/s].
+        max_deceleration: [unit/s²].
+        lag_s: command to motion [s].
+        deadband: axis size below which no motion is commanded [-].
+        unit: "rad" or "m".
+    """
+
+    name: str
+    axis: int
+    sign: int
+    max_velocity: float
+    max_deceleration: float
+    lag_s: float
+    deadband: float
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class JoystickConfig:
+    """How axes become a category: low-pass time [s], hysteresis, debounce [s]."""
+
+    filter_s: float = 0.05
+    release_ratio: float = 0.7
+    debounce_s: float = 0.08
+
+
+@dataclass(frozen=True, slots=True)
+class PriorConfig:
+    """What is believed of a category before it was seen, as shares of an actuator's range.
+
+    Attributes:
+        displacement: expected size of a displacement [share of the range].
+        spread: standard deviation of a displacement about its model [share of the range].
+        weight: how many observations the belief in the mean is worth.
+        slope_weight: how many it is worth that displacement does not depend on position.
+    """
+
+    displacement: float = 0.2
+    spread: float = 0.15
+    weight: float = 1.0
+    slope_weight: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class RampeConfig:
+    """The estimator: first forecast after ``n_init`` occurrences, forgetting factor λ, prior."""
+
+    n_init: int = 3
+    basis: str = "affine"
+    forgetting: float = 1.0
+    tol: float = 1e-9
+    prior: PriorConfig = field(default_factory=PriorConfig)
+    observations: tuple[str, ...] = ("q",)
+
+
+@dataclass(frozen=True, slots=True)
+class StoppingConfig:
+    """The stopping forecast: the operator's reaction time [s]."""
+
+    reaction_s: float = 0.3
+
+
+@dataclass(frozen=True, slots=True)
+class SweepConfig:
+    """Tolerance of a contact [m], of a clearance [m], and the budget of clearance queries."""
+
+    tolerance_m: float = 0.0002
+    clearance_tolerance_m: float = 0.05
+    max_queries: int = 4000
+
+
+@dataclass(frozen=True, slots=True)
+class AlertConfig:
+    """When an alert is raised, held and given back.
+
+    Attributes:
+        warning_probability: smallest probability of contact that warns [-].
+        debounce_steps: evaluations in a row before a caution or warning is published.
+        imminent_steps: the same for imminent.
+        off_delay_s: how long a cause must be gone before its alert goes [s].
+        min_on_s: shortest life of an alert [s].
+        deadband_m: extra clearance that must be regained [m].
+        deadband_s: extra time to collision that must be regained [s].
+        deadband_probability: how far below the threshold the probability must fall [-].
+        republish_s: period of repeats while an alert is active [s].
+        expires_after_s: age at which a consumer must no longer trust a message [s].
+        horizon_s: contacts further away in time than this are a caution at most [s].
+    """
+
+    warning_probability: float = 0.5
+    debounce_steps: int = 2
+    imminent_steps: int = 1
+    off_delay_s: float = 0.5
+    min_on_s: float = 1.0
+    deadband_m: float = 0.02
+    deadband_s: float = 0.2
+    deadband_probability: float = 0.1
+    republish_s: float = 0.2
+    expires_after_s: float = 1.0
+    horizon_s: float = 6.0
+
+
+@dataclass(frozen=True, slots=True)
+class InputConfig:
+    """Limits of plausible input.
+
+    Attributes:
+        joystick_timeout_s: silence after which monitoring stops [s].
+        actuators_timeout_s: the same for the actuators [s].
+        joystick_on_change: the joystick publishes only when it moves, so its silence is
+            no fault by itself.
+        position_slack: how far a position may lie beyond its limits [share of the range].
+        speed_slack: how many times ``max_velocity`` a measured speed may be [-].
+        max_stamp_jump_s: largest step of a stamp beyond the time that really passed [s].
+    """
+
+    joystick_timeout_s: float = 0.5
+    actuators_timeout_s: float = 0.5
+    joystick_on_change: bool = False
+    position_slack: float = 0.05
+    speed_slack: float = 5.0
+    max_stamp_jump_s: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class GuardConfig:
+    """Everything `Guard` is built from, except geometry."""
+
+    actuators: tuple[ActuatorConfig, ...]
+    joystick: JoystickConfig = field(default_factory=JoystickConfig)
+    rampe: RampeConfig = field(default_factory=RampeConfig)
+    stopping: StoppingConfig = field(default_factory=StoppingConfig)
+    alerts: AlertConfig = field(default_factory=AlertConfig)
+    inputs: InputConfig = field(default_factory=InputConfig)
+    axes: int = 0
+    """Number of joystick axes that a message must have at least."""

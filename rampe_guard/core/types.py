@@ -1,0 +1,171 @@
+"""Samples, categories and sweep results: what travels through the core.
+
+Shapes: ``n`` actuators, ``m`` joystick axes. Actuator units are the site's ([rad] or [m]).
+Times named ``stamp_s`` are on the clock of the sender, times named ``now_s`` or
+``arrival_s`` on the clock of whoever calls the core; only differences are ever used.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Protocol, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+Category: TypeAlias = tuple[int, ...]
+"""Ω: one sign in {-1, 0, +1} per actuator."""
+Point: TypeAlias = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class JoystickSample:
+    """One joystick message: ``axes`` (m,) in [-1, 1]."""
+
+    stamp_s: float
+    axes: FloatArray
+    arrival_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class ActuatorSample:
+    """One actuator message: ``position`` (n,) and, where measured, ``velocity`` (n,)."""
+
+    stamp_s: float
+    position: FloatArray
+    velocity: FloatArray | None
+    arrival_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Inputs:
+    """All that arrived since the last step, each list in order of arrival.
+
+    ``rejected`` counts messages that never became a sample, by (input name, reason).
+    """
+
+    joystick: tuple[JoystickSample, ...] = ()
+    actuators: tuple[ActuatorSample, ...] = ()
+    rejected: tuple[tuple[str, str], ...] = ()
+
+
+class Certificate(StrEnum):
+    """What a sweep proved. ``UNKNOWN`` is never free: the alarm logic treats it as contact."""
+
+    FREE = "free"
+    CONTACT = "contact"
+    UNKNOWN = "unknown"
+
+
+class AnyPath(StrEnum):
+    """Whether any monotone way from start to end could touch."""
+
+    FREE = "free"
+    POSSIBLE = "possible"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True, slots=True)
+class ZoneSweep:
+    """What one sweep proved about one zone (a keep-out object or an actuator limit).
+
+    Attributes:
+        zone: its name.
+        certificate: free, contact or unknown.
+        contact_fraction: first s in [0, 1] that could not be certified free; None when free.
+        link: the link that touches, or comes nearest.
+        contact_point_m: world point [m] of the first contact; None for actuator limits.
+        clearance_m: lower bound [m] of the distance along the whole path less the zone's
+            margin, 0 in contact, None when unknown (for actuator limits: actuator units).
+        clearance_now_m: the same at the start of the path; negative inside the margin.
+        closing: the clearance shrinks at the start of the path.
+    """
+
+    zone: str
+    certificate: Certificate
+    contact_fraction: float | None
+    link: str | None
+    contact_point_m: Point | None
+    clearance_m: float | None
+    clearance_now_m: float | None
+    closing: bool
+
+
+@dataclass(frozen=True, slots=True)
+class SweepResult:
+    """A sweep of every link against every zone; the properties give the worst zone.
+
+    Attributes:
+        zones: one entry per zone, in scene order.
+        any_path: answer for every monotone path, None when it was not asked.
+        queries: clearance queries spent.
+        elapsed_ms: time of the sweep alone [ms], None where no clock was at hand.
+    """
+
+    zones: tuple[ZoneSweep, ...]
+    any_path: AnyPath | None = None
+    queries: int = 0
+    elapsed_ms: float | None = None
+
+    @property
+    def worst(self) -> ZoneSweep | None:
+        """The zone touched first; else an unknown one; else the nearest; None without zones."""
+        touched = [z for z in self.zones if z.contact_fraction is not None]
+        if touched:
+            return min(touched, key=lambda z: z.contact_fraction or 0.0)
+        unknown = [z for z in self.zones if z.certificate is not Certificate.FREE]
+        if unknown:
+            return unknown[0]
+        return min(self.zones, key=lambda z: _or_inf(z.clearance_m), default=None)
+
+    @property
+    def certificate(self) -> Certificate:
+        """Contact if any zone is touched, else unknown if any is, else free."""
+        kinds = {z.certificate for z in self.zones}
+        for kind in (Certificate.CONTACT, Certificate.UNKNOWN):
+            if kind in kinds:
+                return kind
+        return Certificate.FREE
+
+    @property
+    def contact_fraction(self) -> float | None:
+        """First fraction of the path that is not certified free [-]."""
+        return self.worst.contact_fraction if self.worst else None
+
+    @property
+    def zone(self) -> str | None:
+        """Name of the worst zone."""
+        return self.worst.zone if self.worst else None
+
+    @property
+    def link(self) -> str | None:
+        """Link nearest to the worst zone."""
+        return self.worst.link if self.worst else None
+
+    @property
+    def contact_point_m(self) -> Point | None:
+        """World point of the first contact [m]."""
+        return self.worst.contact_point_m if self.worst else None
+
+    @property
+    def clearance_m(self) -> float | None:
+        """Smallest proven clearance over all zones less their margins [m]."""
+        values = [z.clearance_m for z in self.zones]
+        known = [v for v in values if v is not None]
+        return min(known) if known and len(known) == len(values) else None
+
+
+def _or_inf(value: float | None) -> float:
+    return float("inf") if value is None else value
+
+
+class PathSweeper(Protocol):
+    """What the guard needs of geometry: a certified sweep of a straight actuator path."""
+
+    def sweep(
+        self, start: FloatArray, displacement: FloatArray, *, any_path: bool = False
+    ) -> SweepResult:
+        """Sweep from ``start`` (n,) along ``displacement`` (n,), both in actuator units."""
+        ...

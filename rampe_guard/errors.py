@@ -1,0 +1,48 @@
+"""Errors that rampe-guard raises on purpose.
+
+::
+
+    RampeGuardError
+    ├── SettingsError        a site or scene file: file, line, key, value, what to do
+    ├── GeometryError        a URDF, mesh or linkage that cannot be used: file and reason
+    ├── MessageError         a message that breaks the contract: key and reason
+    ├── LogError             a recording that cannot be replayed: file, line, column
+    └── ConnectionFailedError  no router answered, or the session was refused
+
+Each is printed to a user as one message without a traceback, and ends a command with exit
+code 2. Anything else that escapes is a bug and keeps its traceback.
+"""
+
+from __future__ import annotations
+
+
+class RampeGuardError(Exception):
+    """Base of every error that a user can cause and mend."""
+
+
+class SettingsError(RampeGuardError):
+    """A site or scene file is wrong; the message names file, line, key, value and remedy."""
+
+
+class GeometryError(RampeGuardError):
+    """A URDF, mesh or linkage cannot be used; the message names the file and the reason."""
+
+
+class MessageError(RampeGuardError):
+    """A message breaks the contract; the message names the field and the reason.
+
+    Attributes:
+        reason: one of a small set of words, fit for a counter (e.g. ``"bad_json"``).
+    """
+
+    def __init__(self, reason: str, detail: str) -> None:
+        self.reason = reason
+        super().__init__(f"{reason}: {detail}")
+
+
+class LogError(RampeGuardError):
+    """A recording cannot be replayed; the message names file, line or column, and why."""
+
+
+class ConnectionFailedError(RampeGuardError):
+    """No router answered, or the session was refused; the message names the endpoints."""

@@ -1,0 +1,1 @@
+"""Scoring: which contacts were warned of, how early, and how often in vain."""

@@ -1,0 +1,1 @@
+"""The shell around the core: Zenoh, the clock, the worker loop, replay."""

@@ -1,0 +1,1 @@
+"""A simulated machine and a simulated operator, for the demo and for tests."""
