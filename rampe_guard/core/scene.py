@@ -1,0 +1,95 @@
+"""Keep-out objects as plain values: what a scene file says, checked, without any mesh loaded.
+
+Poses are 4x4 homogeneous matrices in the world frame [m]. ``margin_m`` is the keep-out
+distance round the object [m]; ``ignore_links`` names links that may touch it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from rampe_guard.core.types import FloatArray, Point
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeepOut:
+    """What every solid keep-out object has."""
+
+    name: str
+    margin_m: float
+    ignore_links: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Box(KeepOut):
+    """Box with edge lengths ``size_m`` centred on ``pose``."""
+
+    size_m: Point
+    pose: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sphere(KeepOut):
+    """Sphere centred on ``center_m``."""
+
+    radius_m: float
+    center_m: Point
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cylinder(KeepOut):
+    """Cylinder along the z axis of ``pose``, centred on it."""
+
+    radius_m: float
+    height_m: float
+    pose: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Capsule(KeepOut):
+    """All points within ``radius_m`` of the segment from ``start_m`` to ``end_m``."""
+
+    radius_m: float
+    start_m: Point
+    end_m: Point
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Halfspace(KeepOut):
+    """All x with ``normal``·x <= ``offset_m`` (``normal`` of unit length, pointing out)."""
+
+    normal: Point
+    offset_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mesh(KeepOut):
+    """Triangle mesh read from ``file``, scaled by ``scale``, placed at ``pose``."""
+
+    file: str
+    scale: float
+    pose: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ActuatorLimit:
+    """Zone in actuator space: actuator ``actuator`` (index) above and/or below a value."""
+
+    name: str
+    actuator: int
+    above: float | None = None
+    below: float | None = None
+
+
+SolidObject: TypeAlias = Box | Sphere | Cylinder | Capsule | Halfspace | Mesh
+SceneObject: TypeAlias = SolidObject | ActuatorLimit
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """All zones of a site, names unique, in file order."""
+
+    objects: tuple[SceneObject, ...]
+    path: str = ""
+    content_hash: str = ""
