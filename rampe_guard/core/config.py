@@ -90,6 +90,7 @@ class AlertConfig:
 
     Attributes:
         warning_probability: smallest probability of contact that warns [-].
+        caution_probability: smallest probability of contact that is a caution [-].
         debounce_steps: evaluations in a row before a caution or warning is published.
         imminent_steps: the same for imminent.
         off_delay_s: how long a cause must be gone before its alert goes [s].
@@ -103,6 +104,7 @@ class AlertConfig:
     """
 
     warning_probability: float = 0.5
+    caution_probability: float = 0.25
     debounce_steps: int = 2
     imminent_steps: int = 1
     off_delay_s: float = 0.5

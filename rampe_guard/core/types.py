@@ -81,6 +81,7 @@ class ZoneSweep:
             margin, 0 in contact, None when unknown (for actuator limits: actuator units).
         clearance_now_m: the same at the start of the path; negative inside the margin.
         closing: the clearance shrinks at the start of the path.
+        margin_m: the zone's own margin [m]; None for actuator limits.
     """
 
     zone: str
@@ -91,6 +92,19 @@ class ZoneSweep:
     clearance_m: float | None
     clearance_now_m: float | None
     closing: bool
+    margin_m: float | None = None
+
+    @property
+    def inside(self) -> bool:
+        """The arm is within the keep-out distance at the start of the path."""
+        return self.clearance_now_m is not None and self.clearance_now_m <= 0.0
+
+    @property
+    def touching(self) -> bool:
+        """The arm touches the solid object itself at the start of the path."""
+        if self.margin_m is None or self.clearance_now_m is None:
+            return False
+        return self.clearance_now_m <= -self.margin_m
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,99 @@
+"""What a step of the guard has to say. The wire gives these values their JSON form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from rampe_guard.core.alarm import Level, State
+from rampe_guard.core.types import Category, FloatArray, ZoneSweep
+
+Source: TypeAlias = Literal["stopping", "intent", "next", "contact", "system"]
+Quality: TypeAlias = Literal["good", "degraded", "stale"]
+
+SYSTEM_ZONE = "system"
+"""Zone name of the alert that says: not monitoring."""
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """What one evaluation says of one zone.
+
+    Attributes:
+        level: how urgent.
+        source: the forecast that found it.
+        probability: of contact [-].
+        time_to_collision_s: [s], None where no time follows.
+        sweep: the sweep result behind it; None for system evidence.
+        note: extra words (system: the reason).
+    """
+
+    level: Level
+    source: Source
+    probability: float | None
+    time_to_collision_s: float | None
+    sweep: ZoneSweep | None
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class PredictionSummary:
+    """The forecast of the primitive under way, as alerts and predictions carry it."""
+
+    category: Category
+    occurrences: int
+    mean: FloatArray | None
+    scale: FloatArray | None
+    dof: FloatArray | None
+    start: FloatArray
+    endpoint: FloatArray | None
+    progress: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class AlertEvent:
+    """An alert to publish: a transition, or a repeat of one that is active."""
+
+    kind: Literal["transition", "repeat"]
+    alert_id: str
+    seq: int
+    zone: str
+    level: Level
+    previous_level: Level
+    state: State
+    quality: Quality
+    evidence: Evidence
+    prediction: PredictionSummary | None
+    stamp_s: float | None
+    now_s: float
+    input_age_s: float | None
+    raised_s: float
+    changed_s: float
+    acked_by: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class SweepSummary:
+    """One zone of one forecast, for the prediction message."""
+
+    source: Source
+    zone: ZoneSweep
+    probability: float
+    time_to_collision_s: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class PredictionEvent:
+    """A primitive started or ended, or its forecast changed."""
+
+    event: Literal["started", "updated", "ended"]
+    seq: int
+    prediction: PredictionSummary
+    displacement: FloatArray | None
+    learned: bool
+    sweeps: tuple[SweepSummary, ...]
+    stamp_s: float
+    now_s: float
+
+
+Event: TypeAlias = AlertEvent | PredictionEvent

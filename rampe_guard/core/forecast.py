@@ -1,0 +1,221 @@
+"""Forecasts: where the arm is going, as one straight actuator path each.
+
+*Stopping*: where the arm comes to rest if the operator lets go after his reaction time:
+
+    while he holds the lever:   v·lag + v'·reaction + v'²/(2a),  v' = the faster of v and the
+                                speed that his command will bring
+    once he has let go:         v·lag + v²/(2a)
+
+It needs no learning and is the floor under everything.
+
+*Intent*: on to q[k] + x of the primitive under way. x is uncertain, so the path leads to the
+displacement that is exceeded with a small probability, and the place of a contact on it gives
+the probability that the operator goes that far: with progress p already made,
+
+    P(X ≥ d | X ≥ p) = S(d) / S(p),   S the survival function of the Student-t of x.
+
+Actuators are taken to overshoot together (one quantile level for all): that keeps the path
+straight and overestimates rather than underestimates the reach of the arm.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from scipy.special import stdtr, stdtrit
+
+from rampe_guard.core.config import ActuatorConfig
+from rampe_guard.core.primitive import Primitive
+from rampe_guard.core.rampe import DisplacementForecast
+from rampe_guard.core.types import FloatArray
+
+_SMALLEST_SURVIVAL = 1e-9
+"""Beyond this the operator has left all experience behind: no more is foreseen."""
+_CREEP_SHARE = 0.05
+"""Slowest speed, as a share of the top speed, with which a time to collision is reckoned."""
+
+
+@dataclass(frozen=True, slots=True)
+class StoppingForecast:
+    """The stopping path.
+
+    Attributes:
+        displacement: (n,) [unit].
+        speed: |v'| (n,) before braking [unit/s].
+        coast_s: (n,) time before braking begins [s].
+        deceleration: (n,) [unit/s²].
+    """
+
+    displacement: FloatArray
+    speed: FloatArray
+    coast_s: FloatArray
+    deceleration: FloatArray
+
+    @property
+    def stop_s(self) -> float:
+        """Time until every actuator rests [s]."""
+        moving = self.speed > 0.0
+        total = np.where(moving, self.coast_s + self.speed / self.deceleration, 0.0)
+        return float(total.max(initial=0.0))
+
+    def probability_at(self, _fraction: float) -> float:
+        """Certain: it follows from the motion itself."""
+        return 1.0
+
+    def time_at(self, fraction: float) -> float:
+        """Time [s] at which ``fraction`` of the path is reached, by its slowest-ending actuator."""
+        reach = np.abs(self.displacement)
+        if not reach.any():
+            return 0.0
+        j = int(np.argmax(np.where(reach > 0, self.coast_s + self.speed / self.deceleration, 0)))
+        v, a = float(self.speed[j]), float(self.deceleration[j])
+        braking = v * v / (2.0 * a)
+        coast = float(reach[j]) - braking
+        d = fraction * float(reach[j])
+        if d <= coast:
+            return float(self.coast_s[j]) * d / coast
+        left = max(v * v - 2.0 * a * (d - coast), 0.0)
+        return float(self.coast_s[j]) + (v - math.sqrt(left)) / a
+
+
+@dataclass(frozen=True, slots=True)
+class IntentForecast:
+    """The intent path, from the present position on.
+
+    Attributes:
+        displacement: (n,) to the far quantile [unit].
+        sign: Ω (n,).
+        progress: distance already made along Ω (n,) [unit].
+        mean, scale, dof: predictive Student-t of |x| (n,).
+        duration_s: time the path takes [s].
+        occurrences: how many primitives stand behind it.
+    """
+
+    displacement: FloatArray
+    sign: FloatArray
+    progress: FloatArray
+    mean: FloatArray
+    scale: FloatArray
+    dof: FloatArray
+    duration_s: float
+    occurrences: int
+
+    def probability_at(self, fraction: float) -> float:
+        """P that the operator goes at least ``fraction`` of the path, given his progress."""
+        active = (self.sign != 0.0) & (self.displacement != 0.0)
+        if not active.any():
+            return 0.0
+        d = self.progress + fraction * np.abs(self.displacement)
+        here = _survival(self.progress, self.mean, self.scale, self.dof)
+        there = _survival(d, self.mean, self.scale, self.dof)
+        return float(np.clip((there[active] / np.maximum(here[active], 1e-300)).min(), 0.0, 1.0))
+
+    def time_at(self, fraction: float) -> float:
+        """Time [s] at which ``fraction`` of the path is reached."""
+        return fraction * self.duration_s
+
+
+Forecast: TypeAlias = StoppingForecast | IntentForecast
+
+
+class Forecaster:
+    """Makes both forecasts from the present state.
+
+    Args:
+        actuators: in site order.
+        limits: (n, 2) [unit]; no forecast leads past them.
+        reaction_s: operator's reaction time [s].
+        tail: probability with which the intent path's end is exceeded [-].
+    """
+
+    def __init__(
+        self,
+        actuators: tuple[ActuatorConfig, ...],
+        limits: FloatArray,
+        reaction_s: float,
+        tail: float,
+    ) -> None:
+        self._max_velocity = np.array([a.max_velocity for a in actuators])
+        self._deceleration = np.array([a.max_deceleration for a in actuators])
+        self._lag_s = np.array([a.lag_s for a in actuators])
+        self._deadband = np.array([a.deadband for a in actuators])
+        self._limits = limits
+        self._reaction_s = reaction_s
+        self._tail = tail
+
+    def stopping(
+        self, q: FloatArray, velocity: FloatArray, command: FloatArray
+    ) -> StoppingForecast:
+        """Stopping path from q (n,) at ``velocity`` (n,) with the lever at ``command`` (n,)."""
+        applied = np.abs(command) > self._deadband
+        commanded = np.where(applied, command, 0.0) * self._max_velocity
+        faster = (commanded * velocity >= 0.0) & (np.abs(commanded) > np.abs(velocity))
+        held = applied & (command * velocity >= 0.0)
+        top = np.where(faster, commanded, velocity)
+        reaction = np.where(held, self._reaction_s, 0.0)
+        travel = (
+            velocity * self._lag_s + top * reaction + top * np.abs(top) / 2 / self._deceleration
+        )
+        return StoppingForecast(
+            displacement=self._within(q, travel),
+            speed=np.abs(top),
+            coast_s=self._lag_s + reaction,
+            deceleration=self._deceleration,
+        )
+
+    def intent(
+        self,
+        q: FloatArray,
+        velocity: FloatArray,
+        command: FloatArray,
+        primitive: Primitive,
+        forecast: DisplacementForecast,
+    ) -> IntentForecast:
+        """Intent path from q (n,) to the far quantile of the primitive under way."""
+        sign = np.array(primitive.category, dtype=np.float64)
+        progress = np.maximum(sign * (q - primitive.start), 0.0)
+        mean = np.abs(forecast.mean)
+        here = _survival(progress, mean, forecast.scale, forecast.dof)
+        known = here > _SMALLEST_SURVIVAL
+        level = np.clip(self._tail * here, _SMALLEST_SURVIVAL, 1.0 - 1e-12)
+        far = mean - forecast.scale * stdtrit(forecast.dof, level)  # isf of a symmetric law
+        ahead = np.where(known, np.maximum(far - progress, 0.0), 0.0)
+        displacement = self._within(q, sign * ahead)
+        return IntentForecast(
+            displacement=displacement,
+            sign=sign,
+            progress=progress,
+            mean=mean,
+            scale=forecast.scale,
+            dof=forecast.dof,
+            duration_s=self._duration(displacement, velocity, command),
+            occurrences=forecast.occurrences,
+        )
+
+    def _duration(
+        self, displacement: FloatArray, velocity: FloatArray, command: FloatArray
+    ) -> float:
+        """Time [s] for the path at the present or commanded speed, by the busiest actuators."""
+        sign = np.sign(displacement)
+        creep = _CREEP_SHARE * self._max_velocity
+        commanded = sign * command * self._max_velocity
+        speed = np.maximum(np.maximum(sign * velocity, commanded), creep)
+        at_top = np.abs(displacement) / self._max_velocity  # weighs actuators of unlike units
+        if not at_top.any():
+            return 0.0
+        times = np.abs(displacement) / speed + np.where(sign * velocity > creep, 0.0, self._lag_s)
+        return float(at_top @ times / at_top.sum())
+
+    def _within(self, q: FloatArray, displacement: FloatArray) -> FloatArray:
+        low = np.minimum(self._limits[:, 0] - q, 0.0)
+        high = np.maximum(self._limits[:, 1] - q, 0.0)
+        return np.clip(displacement, low, high)
+
+
+def _survival(d: FloatArray, mean: FloatArray, scale: FloatArray, dof: FloatArray) -> FloatArray:
+    """S(d) of the Student-t, elementwise."""
+    result: FloatArray = stdtr(dof, (mean - d) / scale)
+    return result

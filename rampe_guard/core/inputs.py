@@ -1,0 +1,157 @@
+"""The gate: which samples may move the guard, and why the others may not.
+
+A refused sample changes nothing but a counter; the input then grows old, and an old input is
+"not monitoring", never "clear". A sender that truly restarted (its stamps or the position
+jumped, and go on from there) is refused for as long as its time-out, so that the break is
+seen, and then taken up anew.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Generic, Literal, TypeAlias, TypeVar
+
+import numpy as np
+
+from rampe_guard.core.config import ActuatorConfig, InputConfig
+from rampe_guard.core.types import ActuatorSample, FloatArray, JoystickSample
+
+InputName: TypeAlias = Literal["joystick", "actuators"]
+S = TypeVar("S", JoystickSample, ActuatorSample)
+
+_AXIS_SLACK = 0.05
+"""Joysticks overshoot a little at their ends; more is another unit or another column."""
+_MIN_STEP_S = 0.05
+"""Two samples closer than this still may differ by the encoder's last digits and jitter."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rejection:
+    """A sample that was refused: which input, a word for the counter, values for the log."""
+
+    input: InputName
+    reason: str
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
+class Accepted(Generic[S]):
+    """A sample fit for use; ``restarted`` when it does not continue the one before it."""
+
+    sample: S
+    restarted: bool = False
+
+
+class _Continuity(Generic[S]):
+    """Does a sample continue the last good one, or has the sender started anew?"""
+
+    def __init__(self, name: InputName, patience_s: float, config: InputConfig) -> None:
+        self._name: InputName = name
+        self._patience_s = patience_s
+        self._config = config
+        self._good: S | None = None
+        self._suspect: S | None = None
+        self._suspect_since_s = 0.0
+
+    def check(self, sample: S, speed: FloatArray | None = None) -> Accepted[S] | Rejection:
+        if self._good is None:
+            self._good = sample
+            return Accepted(sample)
+        broken = self._break(self._good, sample, speed)
+        if broken is None:
+            self._good, self._suspect = sample, None
+            return Accepted(sample)
+        if self._suspect is None or self._break(self._suspect, sample, speed) is not None:
+            self._suspect_since_s = sample.arrival_s
+        self._suspect = sample
+        if sample.arrival_s - self._suspect_since_s >= self._patience_s:
+            self._good, self._suspect = sample, None
+            return Accepted(sample, restarted=True)
+        return broken
+
+    def _break(self, old: S, new: S, speed: FloatArray | None) -> Rejection | None:
+        step = new.stamp_s - old.stamp_s
+        if step <= 0.0:
+            return Rejection(
+                self._name, "stamp_back", f"stamp {new.stamp_s:.6g} after {old.stamp_s:.6g}"
+            )
+        passed = new.arrival_s - old.arrival_s
+        if step - passed > self._config.max_stamp_jump_s:
+            return Rejection(
+                self._name,
+                "stamp_jump",
+                f"stamp went {step:.3g} s ahead while {passed:.3g} s passed",
+            )
+        if speed is None or not isinstance(new, ActuatorSample):
+            return None
+        moved = np.abs(new.position - old.position)
+        reach = self._config.speed_slack * speed * max(step, _MIN_STEP_S)
+        if (moved > reach).any():
+            j = int(np.argmax(moved - reach))
+            return Rejection(
+                self._name, "position_jump", f"actuator {j} moved {moved[j]:.4g} in {step:.3g} s"
+            )
+        return None
+
+
+class InputGate:
+    """Accepts or refuses decoded samples.
+
+    Args:
+        actuators: in site order.
+        limits: (n, 2) [unit], infinite where there are none.
+        config: limits of plausibility.
+        axes: number of joystick axes that a message must have at least.
+    """
+
+    def __init__(
+        self,
+        actuators: tuple[ActuatorConfig, ...],
+        limits: FloatArray,
+        config: InputConfig,
+        axes: int,
+    ) -> None:
+        self._names = [a.name for a in actuators]
+        self._speed = np.array([a.max_velocity for a in actuators])
+        self._axes = axes
+        bounded = np.isfinite(limits).all(axis=1)
+        width = np.where(bounded, np.where(bounded, limits[:, 1] - limits[:, 0], 0.0), 0.0)
+        self._low = limits[:, 0] - config.position_slack * width
+        self._high = limits[:, 1] + config.position_slack * width
+        self._joystick = _Continuity[JoystickSample]("joystick", config.joystick_timeout_s, config)
+        self._actuators = _Continuity[ActuatorSample](
+            "actuators", config.actuators_timeout_s, config
+        )
+
+    def joystick(self, sample: JoystickSample) -> Accepted[JoystickSample] | Rejection:
+        """Check one joystick sample; axes a hair outside [-1, 1] are clipped."""
+        axes = sample.axes
+        if axes.ndim != 1 or len(axes) < self._axes:
+            return Rejection("joystick", "wrong_length", f"{axes.size} axes, need {self._axes}")
+        if not (np.isfinite(axes).all() and np.isfinite(sample.stamp_s)):
+            return Rejection("joystick", "not_finite", f"axes {axes.tolist()}")
+        size = np.abs(axes)
+        if (size > 1.0 + _AXIS_SLACK).any():
+            j = int(np.argmax(size))
+            return Rejection("joystick", "axis_out_of_range", f"axis {j} is {axes[j]:.4g}")
+        clipped = replace(sample, axes=np.clip(axes, -1.0, 1.0))
+        return self._joystick.check(clipped)
+
+    def actuators(self, sample: ActuatorSample) -> Accepted[ActuatorSample] | Rejection:
+        """Check one actuator sample."""
+        q, n = sample.position, len(self._names)
+        speeds = sample.velocity
+        if q.shape != (n,) or (speeds is not None and speeds.shape != (n,)):
+            return Rejection("actuators", "wrong_length", f"{q.size} positions, need {n}")
+        finite = np.isfinite(q).all() and (speeds is None or np.isfinite(speeds).all())
+        if not (finite and np.isfinite(sample.stamp_s)):
+            return Rejection("actuators", "not_finite", f"position {q.tolist()}")
+        outside = np.maximum(self._low - q, q - self._high)
+        if (outside > 0.0).any():
+            j = int(np.argmax(outside))
+            return Rejection(
+                "actuators",
+                "position_out_of_range",
+                f"{self._names[j]} is {q[j]:.4g}, limits {self._low[j]:.4g} to {self._high[j]:.4g}",
+            )
+        return self._actuators.check(sample, self._speed)
