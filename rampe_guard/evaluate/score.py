@@ -1,0 +1,173 @@
+"""Were contacts warned of, how early, and how often in vain.
+
+Definitions, for one zone and one level (an alert counts if it is at this level or above):
+
+- *contact*: an entry into the zone's margin within the window. A re-entry within 0.5 s of
+  leaving is the same contact. A contact that was there when the window began cannot be
+  warned of: it is not counted, but it excuses an alarm.
+- *alarm*: an episode of alerts, joined across silence of up to 0.5 s, that touches the window.
+- *warned*: an alarm began before the entry, and was on at the entry or had ended at most
+  0.5 s before it. There is at most one such alarm. *Missed*: not warned.
+- *lead time*: entry less the start of that alarm; where an earlier contact lies within the
+  alarm, less the time that contact was left, so that one long alarm earns no credit twice.
+- *false alarm*: no contact overlaps the alarm or the 0.5 s after it. An alarm that is still
+  on 0.5 s before the end of the window and has no contact yet is *undecided*, not false.
+
+Shares are of all contacts: a missed one counts as not early enough.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from statistics import median
+
+from rampe_guard.core.alarm import Level
+from rampe_guard.evaluate.episodes import (
+    SILENCE_S,
+    AlertSpan,
+    Contact,
+    alert_episodes,
+    contact_episodes,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class LevelScore:
+    """Counts for one level, of one zone or of all zones together.
+
+    Attributes:
+        level: alerts at this level or above count.
+        leads_s: lead time of each warned contact, in order of zone and time [s].
+        missed: contacts without a warning.
+        alarms: alarm episodes.
+        false_alarms: those without a contact.
+        undecided: those that the end of the window kept from being true or false.
+        unknown_contacts: contacts that rest on a sweep without an answer.
+        zone_minutes: time watched [min], summed over zones.
+    """
+
+    level: Level
+    leads_s: tuple[float, ...]
+    missed: int
+    alarms: int
+    false_alarms: int
+    undecided: int
+    unknown_contacts: int
+    zone_minutes: float
+
+    @property
+    def warned(self) -> int:
+        """Contacts with a warning."""
+        return len(self.leads_s)
+
+    @property
+    def contacts(self) -> int:
+        """All contacts counted."""
+        return self.warned + self.missed
+
+    @property
+    def median_lead_s(self) -> float | None:
+        """Median lead time of the warned contacts [s]; None without any."""
+        return median(self.leads_s) if self.leads_s else None
+
+    @property
+    def false_per_minute(self) -> float | None:
+        """False alarms per minute and zone [1/min]; None when nothing was watched."""
+        return self.false_alarms / self.zone_minutes if self.zone_minutes > 0.0 else None
+
+    def share_at_least(self, lead_s: float) -> float | None:
+        """Share of all contacts warned of at least ``lead_s`` ahead; None without contacts."""
+        early = sum(lead >= lead_s for lead in self.leads_s)
+        return early / self.contacts if self.contacts else None
+
+
+def score_zone(
+    contacts: Iterable[Contact],
+    spans: Iterable[AlertSpan],
+    zone: str,
+    level: Level,
+    window_s: tuple[float, float],
+) -> LevelScore:
+    """Score one zone at one level over ``window_s`` (start, end) [s].
+
+    Raises:
+        ValueError: the window ends before it starts.
+    """
+    begin_s, end_s = window_s
+    if end_s < begin_s:
+        raise ValueError(f"window ends at {end_s} s, before it starts at {begin_s} s")
+    entries = contact_episodes(contacts, zone)
+    alarms = [
+        (start, end)
+        for start, end in alert_episodes(spans, zone, level)
+        if start <= end_s and end >= begin_s
+    ]
+    empty = [alarm for alarm in alarms if not _has_contact(alarm, entries)]
+    undecided = sum(alarm_end + SILENCE_S > end_s for _, alarm_end in empty)
+    counted = [c for c in entries if begin_s < c.entered_s <= end_s]
+    leads = [_lead_s(c, entries, alarms) for c in counted]
+    return LevelScore(
+        level=level,
+        leads_s=tuple(lead for lead in leads if lead is not None),
+        missed=sum(lead is None for lead in leads),
+        alarms=len(alarms),
+        false_alarms=len(empty) - undecided,
+        undecided=undecided,
+        unknown_contacts=sum(c.unknown for c in counted),
+        zone_minutes=(end_s - begin_s) / 60.0,
+    )
+
+
+def score(
+    contacts: Sequence[Contact],
+    spans: Sequence[AlertSpan],
+    zones: Iterable[str],
+    level: Level,
+    window_s: tuple[float, float],
+) -> dict[str, LevelScore]:
+    """Score every zone at one level; see `total` for all of them together."""
+    return {zone: score_zone(contacts, spans, zone, level, window_s) for zone in zones}
+
+
+def total(scores: Iterable[LevelScore]) -> LevelScore:
+    """Add the scores of several zones at one level.
+
+    Raises:
+        ValueError: no scores, or scores of different levels.
+    """
+    parts = tuple(scores)
+    levels = {part.level for part in parts}
+    if len(levels) != 1:
+        raise ValueError(f"can only add scores of one level, not of {sorted(levels)}")
+    return LevelScore(
+        level=parts[0].level,
+        leads_s=tuple(lead for part in parts for lead in part.leads_s),
+        missed=sum(part.missed for part in parts),
+        alarms=sum(part.alarms for part in parts),
+        false_alarms=sum(part.false_alarms for part in parts),
+        undecided=sum(part.undecided for part in parts),
+        unknown_contacts=sum(part.unknown_contacts for part in parts),
+        zone_minutes=sum(part.zone_minutes for part in parts),
+    )
+
+
+def _lead_s(
+    contact: Contact, entries: Sequence[Contact], alarms: Sequence[tuple[float, float]]
+) -> float | None:
+    entered_s = contact.entered_s
+    for start_s, end_s in alarms:
+        if start_s < entered_s <= end_s + SILENCE_S:
+            left_before = (
+                c.left_s for c in entries if c.left_s is not None and c.left_s < entered_s
+            )
+            return entered_s - max([start_s, *left_before])
+    return None
+
+
+def _has_contact(alarm: tuple[float, float], entries: Sequence[Contact]) -> bool:
+    start_s, end_s = alarm
+    return any(
+        c.entered_s <= end_s + SILENCE_S and (c.left_s is None or c.left_s >= start_s)
+        for c in entries
+    )
