@@ -84,15 +84,17 @@ class SweepSummary:
 
 @dataclass(frozen=True, slots=True)
 class PredictionEvent:
-    """A primitive started or ended, or its forecast changed."""
+    """A primitive started or ended, or its forecast changed.
+
+    When it ended, ``prediction.progress`` is its displacement x, and ``learned`` says
+    whether the model took it.
+    """
 
     event: Literal["started", "updated", "ended"]
     seq: int
     prediction: PredictionSummary
-    displacement: FloatArray | None
     learned: bool
     sweeps: tuple[SweepSummary, ...]
-    stamp_s: float
     now_s: float
 
 

@@ -9,14 +9,13 @@ seen, and then taken up anew.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Generic, Literal, TypeAlias, TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 
 from rampe_guard.core.config import ActuatorConfig, InputConfig
-from rampe_guard.core.types import ActuatorSample, FloatArray, JoystickSample
+from rampe_guard.core.types import ActuatorSample, FloatArray, InputName, JoystickSample
 
-InputName: TypeAlias = Literal["joystick", "actuators"]
 S = TypeVar("S", JoystickSample, ActuatorSample)
 
 _AXIS_SLACK = 0.05

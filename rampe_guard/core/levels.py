@@ -27,10 +27,9 @@ from rampe_guard.core.types import Certificate, ZoneSweep
 
 @dataclass(frozen=True, slots=True)
 class LevelRules:
-    """Thresholds: the alert settings and the operator's reaction time [s]."""
+    """Thresholds of the alert settings."""
 
     alerts: AlertConfig
-    reaction_s: float
 
     def judge(self, forecast: Forecast, sweep: ZoneSweep, shown: Level, stop_s: float) -> Evidence:
         """Evidence of one forecast about one zone.
@@ -39,7 +38,7 @@ class LevelRules:
             forecast: the swept forecast.
             sweep: what the sweep proved of the zone.
             shown: the level that the zone's alert shows now.
-            stop_s: time the machine needs to stop from its present motion [s].
+            stop_s: time to react and to stop from the present motion [s].
         """
         touched = sweep.certificate is not Certificate.FREE
         if not touched:
@@ -64,7 +63,7 @@ class LevelRules:
 
         band = alerts.deadband_probability
         if probability >= alerts.warning_probability - slack(Level.WARNING, band):
-            if time_s <= self.reaction_s + stop_s + slack(Level.IMMINENT, alerts.deadband_s):
+            if time_s <= stop_s + slack(Level.IMMINENT, alerts.deadband_s):
                 return Level.IMMINENT
             return Level.WARNING if time_s <= alerts.horizon_s else Level.CAUTION
         if probability >= alerts.caution_probability - slack(Level.CAUTION, band):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Protocol, TypeAlias
+from typing import Literal, Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,7 @@ FloatArray: TypeAlias = npt.NDArray[np.float64]
 Category: TypeAlias = tuple[int, ...]
 """Ω: one sign in {-1, 0, +1} per actuator."""
 Point: TypeAlias = tuple[float, float, float]
+InputName: TypeAlias = Literal["joystick", "actuators"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +44,14 @@ class ActuatorSample:
 class Inputs:
     """All that arrived since the last step, each list in order of arrival.
 
-    ``rejected`` counts messages that never became a sample, by (input name, reason).
+    ``rejected`` lists messages that never became a sample, as (input name, reason).
+    ``joystick_alive`` is what the joystick's liveliness token says, None without a token.
     """
 
     joystick: tuple[JoystickSample, ...] = ()
     actuators: tuple[ActuatorSample, ...] = ()
-    rejected: tuple[tuple[str, str], ...] = ()
+    rejected: tuple[tuple[InputName, str], ...] = ()
+    joystick_alive: bool | None = None
 
 
 class Certificate(StrEnum):

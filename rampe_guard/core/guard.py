@@ -1,0 +1,219 @@
+"""`Guard.step`: samples in, events out. The only composer of the core, and deterministic.
+
+Each step takes every sample that arrived, in stamp order, and lets it update the operator's
+intention and the arm's motion. Then, if a new position came, the newest state is swept once
+for each forecast, judged zone by zone, and alarmed. A step without a new position only lets
+time pass: silence is noticed, active alerts are repeated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rampe_guard.core.alarm import Level
+from rampe_guard.core.annunciator import Annunciator, Moment
+from rampe_guard.core.config import GuardConfig
+from rampe_guard.core.events import (
+    AlertEvent,
+    Event,
+    Evidence,
+    PredictionSummary,
+    Source,
+    SweepSummary,
+)
+from rampe_guard.core.forecast import Forecast, Forecaster, StoppingForecast
+from rampe_guard.core.inputs import Accepted, InputGate, Rejection
+from rampe_guard.core.intention import Intention
+from rampe_guard.core.levels import LevelRules, worst
+from rampe_guard.core.monitor import Health, InputMonitor, Status
+from rampe_guard.core.rampe import Rampe
+from rampe_guard.core.types import (
+    ActuatorSample,
+    Certificate,
+    FloatArray,
+    Inputs,
+    JoystickSample,
+    PathSweeper,
+    ZoneSweep,
+)
+from rampe_guard.core.velocity import VelocityEstimator
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """The present state of a guard, for heartbeat and late joiners."""
+
+    health: Health
+    position: FloatArray | None
+    velocity: FloatArray
+    command: FloatArray
+    alerts: tuple[AlertEvent, ...]
+    prediction: PredictionSummary | None
+    sweeps: tuple[SweepSummary, ...]
+
+
+class Guard:
+    """Early warning for one machine.
+
+    Args:
+        config: settings.
+        limits: actuator limits (n, 2) [unit], infinite where there are none.
+        sweeper: geometry.
+        start_s: time at which monitoring begins, on the clock of ``now_s``.
+        boot_id: makes alert ids unique across restarts.
+    """
+
+    def __init__(
+        self,
+        config: GuardConfig,
+        limits: FloatArray,
+        sweeper: PathSweeper,
+        start_s: float,
+        boot_id: str = "offline",
+    ) -> None:
+        alerts = config.alerts
+        tail = max(alerts.caution_probability - alerts.deadband_probability, 0.02)
+        self._sweeper = sweeper
+        self._gate = InputGate(config.actuators, limits, config.inputs, config.axes)
+        self._monitor = InputMonitor(config.inputs, start_s)
+        self._intention = Intention(config, limits)
+        self._velocity = VelocityEstimator(np.array([a.max_velocity for a in config.actuators]))
+        self._forecaster = Forecaster(config.actuators, limits, config.stopping.reaction_s, tail)
+        self._reaction_s = config.stopping.reaction_s
+        self._rules = LevelRules(alerts)
+        self._annunciator = Annunciator(alerts, boot_id)
+        self._newest: ActuatorSample | None = None
+        self._sweeps: tuple[SweepSummary, ...] = ()
+
+    @property
+    def rampe(self) -> Rampe:
+        """The learned models."""
+        return self._intention.rampe
+
+    def step(self, inputs: Inputs, now_s: float) -> tuple[Event, ...]:
+        """Take all that arrived since the last step; returns what is to be published."""
+        self._monitor.joystick_alive(inputs.joystick_alive)
+        for name, reason in inputs.rejected:
+            self._refuse(Rejection(name, reason, ""), now_s)
+        events: list[Event] = []
+        before = self._newest
+        for sample in _in_stamp_order(inputs):
+            events += self._take(sample, now_s)
+        health = self._monitor.health(now_s)
+        moment = self._moment(health, now_s)
+        events += self._annunciator.system(_system_evidence(health), moment)
+        if health.status is Status.NOT_MONITORING:
+            self._intention.interrupt()
+            events += self._annunciator.freeze(moment)
+        elif self._newest is not None and self._newest is not before:
+            events += self._evaluate(self._newest, now_s)
+        else:
+            events += self._annunciator.repeats(moment)
+        return tuple(events)
+
+    def acknowledge(self, alert_id: str, who: str, now_s: float) -> tuple[Event, ...]:
+        """Someone has seen an alert; empty if no alert of that id waits for it."""
+        moment = self._moment(self._monitor.health(now_s), now_s)
+        return tuple(self._annunciator.acknowledge(alert_id, who, moment))
+
+    def snapshot(self, now_s: float) -> Snapshot:
+        """The present state."""
+        moment = self._moment(health := self._monitor.health(now_s), now_s)
+        return Snapshot(
+            health=health,
+            position=None if self._newest is None else self._newest.position,
+            velocity=self._velocity.velocity,
+            command=self._intention.command,
+            alerts=tuple(self._annunciator.active(moment)),
+            prediction=moment.prediction,
+            sweeps=self._sweeps,
+        )
+
+    def _take(self, sample: JoystickSample | ActuatorSample, now_s: float) -> list[Event]:
+        learn = self._monitor.plausible(now_s)
+        if isinstance(sample, JoystickSample):
+            lever = self._gate.joystick(sample)
+            if isinstance(lever, Rejection):
+                return self._refuse(lever, now_s)
+            self._monitor.accept("joystick", sample.arrival_s)
+            self._restart(lever)
+            return [*self._intention.joystick(lever.sample, now_s, learn=learn)]
+        moved = self._gate.actuators(sample)
+        if isinstance(moved, Rejection):
+            return self._refuse(moved, now_s)
+        self._monitor.accept("actuators", sample.arrival_s)
+        self._restart(moved)
+        self._newest = moved.sample
+        self._velocity.update(moved.sample)
+        return [*self._intention.actuators(moved.sample, now_s, learn=learn)]
+
+    def _refuse(self, rejection: Rejection, now_s: float) -> list[Event]:
+        self._monitor.reject(rejection.input, rejection.reason, now_s)
+        self._intention.interrupt()
+        return []
+
+    def _restart(self, accepted: Accepted[JoystickSample] | Accepted[ActuatorSample]) -> None:
+        if accepted.restarted:
+            self._velocity.reset()
+            self._intention.reset()
+
+    def _evaluate(self, newest: ActuatorSample, now_s: float) -> list[Event]:
+        q, v, u = newest.position, self._velocity.velocity, self._intention.command
+        stopping = self._forecaster.stopping(q, v, u)
+        forecasts: list[Forecast] = [stopping]
+        current, known = self._intention.current, self._intention.forecast
+        if current is not None and known is not None:
+            forecasts.append(self._forecaster.intent(q, v, u, current, known))
+        stop_s = max(stopping.stop_s, self._reaction_s)
+        evidence: dict[str, list[Evidence]] = {}
+        sweeps = []
+        for forecast in forecasts:
+            result = self._sweeper.sweep(q, forecast.displacement)
+            if result.certificate is Certificate.UNKNOWN:
+                self._monitor.sweep_unknown(now_s)
+            for zone in result.zones:
+                shown = self._annunciator.shown(zone.zone)
+                found = self._rules.judge(forecast, zone, shown, stop_s)
+                evidence.setdefault(zone.zone, []).append(found)
+                sweeps.append(_summary(forecast, zone))
+        self._sweeps = tuple(sweeps)
+        moment = self._moment(self._monitor.health(now_s), now_s)
+        alerts = self._annunciator.update({z: worst(e) for z, e in evidence.items()}, moment)
+        return [*alerts, *self._intention.update(q, self._sweeps, now_s)]
+
+    def _moment(self, health: Health, now_s: float) -> Moment:
+        newest = self._newest
+        return Moment(
+            now_s=now_s,
+            stamp_s=None if newest is None else newest.stamp_s,
+            input_age_s=health.ages_s["actuators"],
+            prediction=None if newest is None else self._intention.summary(newest.position),
+            degraded=health.status is Status.DEGRADED,
+        )
+
+
+def _in_stamp_order(inputs: Inputs) -> list[JoystickSample | ActuatorSample]:
+    """All samples by stamp; the joystick first at a tie, since the command causes the motion."""
+    tagged: list[JoystickSample | ActuatorSample] = [*inputs.joystick, *inputs.actuators]
+
+    def key(sample: JoystickSample | ActuatorSample) -> float:
+        return sample.stamp_s if np.isfinite(sample.stamp_s) else -np.inf
+
+    return sorted(tagged, key=key)  # stable: the joystick stays first
+
+
+def _summary(forecast: Forecast, zone: ZoneSweep) -> SweepSummary:
+    source: Source = "stopping" if isinstance(forecast, StoppingForecast) else "intent"
+    if zone.certificate is Certificate.FREE:
+        return SweepSummary(source, zone, 0.0, None)
+    at = zone.contact_fraction or 0.0
+    return SweepSummary(source, zone, forecast.probability_at(at), forecast.time_at(at))
+
+
+def _system_evidence(health: Health) -> Evidence:
+    if health.status is not Status.NOT_MONITORING:
+        return Evidence(Level.CLEAR, "system", None, None, None)
+    note = "; ".join(r.text for r in health.reasons)
+    return Evidence(Level.WARNING, "system", None, None, None, note)

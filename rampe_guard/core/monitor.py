@@ -1,0 +1,144 @@
+"""Can the guard see? Ages, refusals and silence of both inputs, and what follows from them.
+
+``ok``              both inputs are fresh and plausible
+``degraded``        monitoring, but something is not as it should be (with reasons)
+``not_monitoring``  an input is missing or too old: nothing that is shown can be trusted
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from dataclasses import dataclass
+from enum import StrEnum
+
+from rampe_guard.core.config import InputConfig
+from rampe_guard.core.types import InputName
+
+_RECENT_S = 5.0
+"""How long a refusal or an unknown sweep keeps the status degraded [s]."""
+_PLAUSIBLE_WINDOW_S = 10.0
+_IMPLAUSIBLE_SHARE = 0.1
+"""More refused samples than this share is not a glitch: wrong columns, scale or sensor."""
+_ENOUGH_SAMPLES = 20
+
+
+class Status(StrEnum):
+    """Whether the guard protects."""
+
+    OK = "ok"
+    DEGRADED = "degraded"
+    NOT_MONITORING = "not_monitoring"
+
+
+@dataclass(frozen=True, slots=True)
+class Reason:
+    """Why the status is not ok: a code, the input it concerns (if one), words with values."""
+
+    code: str
+    input: InputName | None
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Health:
+    """Status with its reasons, and the age of the newest good sample of each input [s]."""
+
+    status: Status
+    reasons: tuple[Reason, ...]
+    ages_s: dict[InputName, float | None]
+    accepted: dict[InputName, int]
+    rejected: dict[tuple[InputName, str], int]
+
+
+class InputMonitor:
+    """Keeps the books of both inputs; time is passed in.
+
+    Args:
+        config: time-outs.
+        start_s: when monitoring began; silence is counted from here until the first sample.
+    """
+
+    def __init__(self, config: InputConfig, start_s: float) -> None:
+        self._config = config
+        self._start_s = start_s
+        self._last_s: dict[InputName, float | None] = {"joystick": None, "actuators": None}
+        self._accepted: Counter[InputName] = Counter()
+        self._rejected: Counter[tuple[InputName, str]] = Counter()
+        self._recent: dict[tuple[InputName, str], float] = {}
+        self._window: deque[tuple[float, bool]] = deque()
+        self._unknown_s: float | None = None
+        self._joystick_alive: bool | None = None
+
+    def accept(self, name: InputName, arrival_s: float) -> None:
+        """A good sample arrived."""
+        self._last_s[name] = arrival_s
+        self._accepted[name] += 1
+        self._window.append((arrival_s, True))
+
+    def reject(self, name: InputName, reason: str, now_s: float) -> None:
+        """A message was refused."""
+        self._rejected[name, reason] += 1
+        self._recent[name, reason] = now_s
+        self._window.append((now_s, False))
+
+    def sweep_unknown(self, now_s: float) -> None:
+        """A sweep ended without an answer."""
+        self._unknown_s = now_s
+
+    def joystick_alive(self, alive: bool | None) -> None:
+        """What the joystick's liveliness token says; None without a token."""
+        self._joystick_alive = alive
+
+    def plausible(self, now_s: float) -> bool:
+        """Few enough samples are refused that the accepted ones may be learned from."""
+        while self._window and self._window[0][0] < now_s - _PLAUSIBLE_WINDOW_S:
+            self._window.popleft()
+        bad = sum(not good for _, good in self._window)
+        return len(self._window) < _ENOUGH_SAMPLES or bad <= _IMPLAUSIBLE_SHARE * len(self._window)
+
+    def health(self, now_s: float) -> Health:
+        """Status at ``now_s``."""
+        blind = [r for r in (self._silence("actuators", now_s), self._joystick(now_s)) if r]
+        weak = self._weaknesses(now_s)
+        status = Status.NOT_MONITORING if blind else Status.DEGRADED if weak else Status.OK
+        ages: dict[InputName, float | None] = {
+            name: None if last is None else max(now_s - last, 0.0)
+            for name, last in self._last_s.items()
+        }
+        return Health(status, (*blind, *weak), ages, dict(self._accepted), dict(self._rejected))
+
+    def _joystick(self, now_s: float) -> Reason | None:
+        if self._joystick_alive is False:
+            return Reason("joystick_gone", "joystick", "the joystick's liveliness token is gone")
+        if self._config.joystick_on_change:
+            return None
+        return self._silence("joystick", now_s)
+
+    def _silence(self, name: InputName, now_s: float) -> Reason | None:
+        limit = self._config.joystick_timeout_s
+        if name == "actuators":
+            limit = self._config.actuators_timeout_s
+        last = self._last_s[name]
+        if now_s - (self._start_s if last is None else last) <= limit:
+            return None
+        if last is None:
+            return Reason(f"{name}_silent", name, f"no good {name} message yet")
+        return Reason(f"{name}_silent", name, f"no good {name} message for more than {limit:g} s")
+
+    def _weaknesses(self, now_s: float) -> list[Reason]:
+        found = []
+        if self._config.joystick_on_change and self._last_s["joystick"] is None:
+            text = "no joystick message yet: only the stopping forecast protects"
+            found.append(Reason("joystick_unknown", "joystick", text))
+        for (name, reason), at in sorted(self._recent.items()):
+            if now_s - at <= _RECENT_S:
+                count = self._rejected[name, reason]
+                text = f"{count} {name} messages refused: {reason}"
+                found.append(Reason(f"{name}_{reason}", name, text))
+        if not self.plausible(now_s):
+            text = "many messages refused: columns, scale or sensor wrong? Nothing is learned now"
+            found.append(Reason("implausible", None, text))
+        if self._unknown_s is not None and now_s - self._unknown_s <= _RECENT_S:
+            text = "a sweep ran out of its budget and was taken as contact"
+            found.append(Reason("sweep_unknown", None, text))
+        return found
