@@ -1,0 +1,30 @@
+"""Site and scene files: YAML → checked models → core values, errors with file and line.
+
+::
+
+    source (YAML, lines) → explain.validate (pydantic models) → check → site / scene (core)
+"""
+
+from rampe_guard.settings.scene import load_scene, parse_scene
+from rampe_guard.settings.schema import scene_schema, site_schema
+from rampe_guard.settings.site import (
+    ColumnMap,
+    Keys,
+    LogMapping,
+    Site,
+    ZenohSettings,
+    load_site,
+)
+
+__all__ = [
+    "ColumnMap",
+    "Keys",
+    "LogMapping",
+    "Site",
+    "ZenohSettings",
+    "load_scene",
+    "load_site",
+    "parse_scene",
+    "scene_schema",
+    "site_schema",
+]

@@ -1,0 +1,137 @@
+"""What a site file must hold beyond the shape of its values: names, keys, drives, axes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from rampe_guard.settings.drive_model import impossible
+from rampe_guard.settings.problems import KeyPath, Problems, did_you_mean, show
+from rampe_guard.settings.site_model import ArmModel, ColumnModel, LogModel, SiteModel
+
+PUBLISHED = ("alert", "prediction", "heartbeat", "state", "scene", "ack", "shelve", "alive")
+"""What the guard publishes or answers under its base key."""
+
+_WILD = "*$?#"
+
+
+def check(model: SiteModel, problems: Problems) -> None:
+    """Add every problem of ``model`` that needs no other file."""
+    _keys(model, problems)
+    _zenoh(model, problems)
+    if model.alerts.caution_probability > model.alerts.warning_probability:
+        what = f"{model.alerts.caution_probability:g} is greater than warning_probability"
+        problems.add(("alerts", "caution_probability"), what, "give at most that probability")
+    _actuators(model.arm, problems)
+    _linkages(model.arm, problems)
+    if model.log is not None:
+        _log(model.log, [a.name for a in model.arm.actuators], problems)
+
+
+def _keys(model: SiteModel, problems: Problems) -> None:
+    keys: list[tuple[KeyPath, str]] = [
+        (("keys", "joystick"), model.keys.joystick),
+        (("keys", "actuators"), model.keys.actuators),
+        (("keys", "base"), model.keys.base),
+    ]
+    alive: KeyPath = ("inputs", "joystick", "alive_key")
+    if model.inputs.joystick.alive_key is not None:
+        keys.append((alive, model.inputs.joystick.alive_key))
+    elif model.inputs.joystick.on_change:
+        what = "is missing, and on_change makes the joystick's silence mean nothing"
+        problems.add(alive, what, "give the key of the publisher's liveliness token")
+    first: dict[str, KeyPath] = {}
+    for path, key in keys:
+        if wrong := _wrong_key(key):
+            problems.add(path, f"{show(key)} {wrong}", "give an exact Zenoh key such as a/b/c")
+        if key in first:
+            other = ".".join(str(part) for part in first[key])
+            problems.add(path, f"{show(key)} is also {other}", "give every key its own name")
+        first.setdefault(key, path)
+        if key in {f"{model.keys.base}/{word}" for word in PUBLISHED}:
+            what = f"{show(key)} is a key that the guard itself publishes under keys.base"
+            problems.add(path, what, "give another key")
+
+
+def _wrong_key(key: str) -> str | None:
+    wild = [letter for letter in _WILD if letter in key]
+    if wild:
+        return f"has {show(wild[0])}, which an exact key cannot have"
+    if key.startswith("/") or key.endswith("/"):
+        return "starts or ends with a slash"
+    return "has an empty part (//)" if "//" in key else None
+
+
+def _zenoh(model: SiteModel, problems: Problems) -> None:
+    zenoh = model.zenoh
+    if zenoh.config is not None:
+        if zenoh.connect is not None:
+            what = "stands beside a config file"
+            problems.add(("zenoh", "connect"), what, "put the endpoints into that file")
+    elif zenoh.connect == ():
+        what = "names no endpoint, and scouting is off"
+        problems.add(("zenoh", "connect"), what, "give one, such as tcp/127.0.0.1:7447")
+
+
+def _actuators(arm: ArmModel, problems: Problems) -> None:
+    names: dict[str, int] = {}
+    axes: dict[int, str] = {}
+    for index, actuator in enumerate(arm.actuators):
+        where: KeyPath = ("arm", "actuators", index)
+        if actuator.name in names:
+            what = f"{show(actuator.name)} is also the name of actuator {names[actuator.name]}"
+            problems.add((*where, "name"), what, "give every actuator a name of its own")
+        names.setdefault(actuator.name, index)
+        axis = index if actuator.axis is None else actuator.axis
+        if axis in axes:
+            what = f"{axis} is the axis of {show(axes[axis])} already"
+            problems.add((*where, "axis"), what, "give every actuator an axis of its own")
+        axes.setdefault(axis, actuator.name)
+        lower, upper = actuator.limits.lower, actuator.limits.upper
+        if lower is not None and upper is not None and lower >= upper:
+            what = f"lower {lower:g} is not less than upper {upper:g}"
+            problems.add((*where, "limits"), what, "swap or correct them")
+        elif reason := impossible(actuator.drive.to_core(), lower, upper):
+            problems.add((*where, "drive"), reason, "measure its dimensions and limits again")
+
+
+def _linkages(arm: ArmModel, problems: Problems) -> None:
+    limits = {a.name: (a.limits.lower, a.limits.upper) for a in arm.actuators}
+    joints: dict[str, KeyPath] = {}
+    moved = [(("arm", "actuators", i, "joint"), a.joint) for i, a in enumerate(arm.actuators)]
+    moved += [(("arm", "linkages", i, "joint"), k.joint) for i, k in enumerate(arm.linkages)]
+    for path, joint in moved:
+        if joint in joints:
+            what = f"{show(joint)} is driven twice"
+            problems.add(path, what, "let each joint follow one actuator")
+        joints.setdefault(joint, path)
+    for index, linkage in enumerate(arm.linkages):
+        where: KeyPath = ("arm", "linkages", index)
+        if linkage.actuator not in limits:
+            what = f"{show(linkage.actuator)} is not an actuator"
+            problems.add((*where, "actuator"), what, did_you_mean(linkage.actuator, limits))
+        elif reason := impossible(linkage.drive.to_core(), *limits[linkage.actuator]):
+            problems.add((*where, "drive"), reason, "measure its dimensions again")
+
+
+def _log(log: LogModel, names: list[str], problems: Problems) -> None:
+    for part, columns in (("joystick", log.joystick), ("actuators", log.actuators)):
+        _log_names(("log", part), columns, names, problems)
+        for name, column in columns.items():
+            if isinstance(column, ColumnModel) and column.scale == 0.0:
+                what = "0 makes every value the same"
+                problems.add(("log", part, name, "scale"), what, "give the factor to site units")
+    if isinstance(log.time, ColumnModel) and log.time.scale <= 0.0:
+        what = f"{log.time.scale:g} is not greater than 0"
+        problems.add(("log", "time", "scale"), what, "give the factor to seconds")
+
+
+def _log_names(path: KeyPath, columns: Iterable[str], names: list[str], problems: Problems) -> None:
+    given = list(columns)
+    for name in given:
+        if name not in names:
+            what = f"{show(name)} is not an actuator"
+            problems.add((*path, name), what, did_you_mean(name, names))
+    missing = [name for name in names if name not in given]
+    if missing:
+        what = f"has no column for {', '.join(missing)}"
+        problems.add(path, what, "name a column for every actuator")

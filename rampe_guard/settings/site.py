@@ -1,0 +1,234 @@
+"""Site files → `Site`: all that a machine's guard is built from, as plain frozen values."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from rampe_guard.core.arm import ArmDescription, JointDrive
+from rampe_guard.core.config import (
+    ActuatorConfig,
+    AlertConfig,
+    GuardConfig,
+    InputConfig,
+    JoystickConfig,
+    PriorConfig,
+    RampeConfig,
+    StoppingConfig,
+    SweepConfig,
+)
+from rampe_guard.core.drive import CylinderDrive, FourBarDrive
+from rampe_guard.core.scene import Scene
+from rampe_guard.errors import SettingsError
+from rampe_guard.settings.check import check
+from rampe_guard.settings.explain import validate
+from rampe_guard.settings.problems import Problems
+from rampe_guard.settings.scene import existing_file, load_scene, pose_matrix
+from rampe_guard.settings.site_model import (
+    DEFAULT_ENDPOINT,
+    ActuatorModel,
+    ColumnModel,
+    LogModel,
+    SiteModel,
+)
+from rampe_guard.settings.source import parse, read_bytes
+
+
+@dataclass(frozen=True, slots=True)
+class ZenohSettings:
+    """How to join the network.
+
+    Attributes:
+        config: path of a Zenoh file, which then alone configures the session, or None.
+        mode: "client" or "peer"; holds only without ``config``.
+        connect: endpoints; holds only without ``config``.
+    """
+
+    config: str | None
+    mode: Literal["client", "peer"]
+    connect: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Keys:
+    """Exact Zenoh keys; ``base`` is the prefix of all that the guard publishes."""
+
+    joystick: str
+    actuators: str
+    base: str
+    joystick_alive: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class ColumnMap:
+    """Site value = scale·(value in ``column``) + offset."""
+
+    column: str
+    scale: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class LogMapping:
+    """Columns of a CSV log: time [s], axis [-1, 1] and position [unit] by actuator name."""
+
+    time: ColumnMap
+    joystick: Mapping[str, ColumnMap]
+    actuators: Mapping[str, ColumnMap]
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """A machine at a site.
+
+    Attributes:
+        name: of the site.
+        machine: name of the machine.
+        zenoh: how to join the network.
+        keys: what to subscribe to and publish on.
+        format: of the input messages.
+        arm: URDF, pose, drives and limits.
+        guard: actuators and settings of the core.
+        sweep: tolerances and budget.
+        scene: keep-out zones.
+        log: columns of CSV logs, None if the file names none.
+        path: absolute path of the site file.
+        content_hash: SHA-256 (hex) of the site file followed by the URDF.
+        package_dirs: where package:// meshes of the URDF are looked up.
+    """
+
+    name: str
+    machine: str
+    zenoh: ZenohSettings
+    keys: Keys
+    format: Literal["json", "ros2"]
+    arm: ArmDescription
+    guard: GuardConfig
+    sweep: SweepConfig
+    scene: Scene
+    log: LogMapping | None
+    path: str
+    content_hash: str
+    package_dirs: tuple[str, ...] = ()
+
+    @property
+    def actuator_names(self) -> tuple[str, ...]:
+        """Names in the order of the arrays on the wire."""
+        return tuple(a.name for a in self.guard.actuators)
+
+
+def load_site(path: str | Path) -> Site:
+    """Read a site file, and the scene file that it names.
+
+    Args:
+        path: the YAML file; every path in it is relative to it.
+
+    Raises:
+        SettingsError: with file, line, key, value and remedy of every problem.
+    """
+    content = read_bytes(path, "site file", "give the path of a site file (config/sites/*.yaml)")
+    document = parse(content, str(path))
+    model = validate(SiteModel, document)
+    directory = Path(path).parent
+    problems = Problems(document)
+    check(model, problems)
+    arm = model.arm
+    urdf = existing_file(problems, ("arm", "urdf"), directory, arm.urdf, "URDF file")
+    zenoh_config = None
+    if model.zenoh.config is not None:
+        where = ("zenoh", "config")
+        file = model.zenoh.config
+        zenoh_config = existing_file(problems, where, directory, file, "Zenoh configuration file")
+    names = tuple(a.name for a in arm.actuators)
+    scene = Scene(())
+    scene_file = existing_file(problems, ("scene",), directory, model.scene, "scene file")
+    if scene_file is not None:
+        try:
+            scene = load_scene(scene_file, actuators=names)
+        except SettingsError as error:
+            problems.extend(error)
+    problems.raise_if_any()
+    digest = hashlib.sha256(content + read_bytes(urdf or "", "URDF file"))
+    return Site(
+        name=model.site,
+        machine=model.machine,
+        zenoh=_zenoh(model, zenoh_config),
+        keys=Keys(**model.keys.model_dump(), joystick_alive=model.inputs.joystick.alive_key),
+        format=model.format,
+        arm=_arm(model, urdf or ""),
+        guard=_guard(model),
+        sweep=SweepConfig(**model.sweep.model_dump()),
+        scene=scene,
+        log=None if model.log is None else _log(model.log),
+        path=str(Path(path).absolute()),
+        content_hash=digest.hexdigest(),
+        package_dirs=tuple(os.path.normpath(directory / d) for d in arm.package_dirs),
+    )
+
+
+def _zenoh(model: SiteModel, config: str | None) -> ZenohSettings:
+    connect = model.zenoh.connect
+    if connect is None:
+        connect = () if config else (DEFAULT_ENDPOINT,)
+    return ZenohSettings(config, model.zenoh.mode, connect)
+
+
+def _arm(model: SiteModel, urdf: str) -> ArmDescription:
+    arm = model.arm
+    index = {a.name: i for i, a in enumerate(arm.actuators)}
+    own = [JointDrive(a.joint, i, a.drive.to_core()) for i, a in enumerate(arm.actuators)]
+    more = [JointDrive(k.joint, index[k.actuator], k.drive.to_core()) for k in arm.linkages]
+    limits = tuple((a.limits.lower, a.limits.upper) for a in arm.actuators)
+    return ArmDescription(urdf, pose_matrix(arm.base_pose), (*own, *more), limits)
+
+
+def _guard(model: SiteModel) -> GuardConfig:
+    actuators = tuple(_actuator(a, i) for i, a in enumerate(model.arm.actuators))
+    inputs = model.inputs
+    rampe = model.rampe.model_dump(exclude={"prior"})
+    return GuardConfig(
+        actuators=actuators,
+        joystick=JoystickConfig(**model.joystick.model_dump()),
+        rampe=RampeConfig(**rampe, prior=PriorConfig(**model.rampe.prior.model_dump())),
+        stopping=StoppingConfig(**model.stopping.model_dump()),
+        alerts=AlertConfig(**model.alerts.model_dump()),
+        inputs=InputConfig(
+            joystick_timeout_s=inputs.joystick.timeout_s,
+            actuators_timeout_s=inputs.actuators.timeout_s,
+            joystick_on_change=inputs.joystick.on_change,
+            position_slack=inputs.position_slack,
+            speed_slack=inputs.speed_slack,
+            max_stamp_jump_s=inputs.max_stamp_jump_s,
+        ),
+        axes=max(a.axis for a in actuators) + 1,
+    )
+
+
+def _actuator(model: ActuatorModel, index: int) -> ActuatorConfig:
+    hydraulic = isinstance(model.drive.to_core(), CylinderDrive | FourBarDrive)
+    return ActuatorConfig(
+        name=model.name,
+        axis=index if model.axis is None else model.axis,
+        sign=model.sign,
+        max_velocity=model.max_velocity,
+        max_deceleration=model.max_deceleration or 2.0 * model.max_velocity,
+        lag_s=model.lag_s,
+        deadband=model.deadband,
+        unit=model.unit or ("m" if hydraulic else "rad"),
+    )
+
+
+def _log(model: LogModel) -> LogMapping:
+    return LogMapping(
+        time=_column(model.time),
+        joystick={name: _column(column) for name, column in model.joystick.items()},
+        actuators={name: _column(column) for name, column in model.actuators.items()},
+    )
+
+
+def _column(value: str | ColumnModel) -> ColumnMap:
+    return ColumnMap(value) if isinstance(value, str) else ColumnMap(**value.model_dump())

@@ -1,0 +1,172 @@
+"""The site file as pydantic models."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Discriminator, Field, Tag
+
+from rampe_guard.settings.drive_model import DirectModel, DriveModel
+from rampe_guard.settings.model import Model, Name, Number, Pose, Text
+from rampe_guard.settings.tuning_model import (
+    AlertsModel,
+    InputsModel,
+    JoystickModel,
+    RampeModel,
+    StoppingModel,
+    SweepModel,
+)
+
+MAX_ACTUATORS = 16
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+
+Endpoint = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]*/\S+$", max_length=1024)]
+
+
+class ZenohModel(Model):
+    """How the daemon joins the Zenoh network."""
+
+    config: Text | None = Field(
+        default=None, description="The Zenoh configuration file (json5), relative to this file."
+    )
+    mode: Literal["client", "peer"] = Field(
+        default="client", description="The mode of the session: client of a router, or peer."
+    )
+    connect: Annotated[tuple[Endpoint, ...], Field(max_length=32)] | None = Field(
+        default=None,
+        description=f"The endpoints to connect to, {DEFAULT_ENDPOINT} if left out; with a config "
+        "file: the file's own.",
+    )
+
+
+class KeysModel(Model):
+    """Zenoh keys, exact: no wildcard, no slash at an end."""
+
+    joystick: Text = Field(description="The key the joystick is published on.")
+    actuators: Text = Field(description="The key the actuator positions are published on.")
+    base: Text = Field(description="The prefix of every key that the guard publishes.")
+
+
+class LimitsModel(Model):
+    """Limits of an actuator; one left out comes from the URDF through the drive."""
+
+    lower: Number | None = Field(default=None, description="The smallest position [actuator unit].")
+    upper: Number | None = Field(default=None, description="The largest position [actuator unit].")
+
+
+class ActuatorModel(Model):
+    """One actuator: its lever, its joint and how it moves."""
+
+    name: Name = Field(description="The name of the actuator in messages; unique.")
+    joint: Text = Field(description="The name of the joint in the URDF that it drives.")
+    drive: DriveModel = Field(
+        default=DirectModel(type="direct"), description="The map from actuator to joint."
+    )
+    axis: Annotated[int, Field(ge=0, le=63)] | None = Field(
+        default=None,
+        description="The index of its joystick axis; its place in this list if left out.",
+    )
+    sign: Literal[-1, 1] = Field(
+        default=1, description="The sign 1 if a positive axis raises the actuator value, else -1."
+    )
+    unit: Literal["rad", "m"] | None = Field(
+        default=None, description="The unit of its position: m for cylinder and four_bar, else rad."
+    )
+    max_velocity: Annotated[float, Field(gt=0.0, le=1000.0)] = Field(
+        description="The top speed [unit/s]."
+    )
+    max_deceleration: Annotated[float, Field(gt=0.0, le=1e5)] | None = Field(
+        default=None, description="The braking [unit/s²]; twice max_velocity if left out."
+    )
+    lag_s: Annotated[float, Field(ge=0.0, le=5.0)] = Field(
+        default=0.15, description="The time from command to motion [s]."
+    )
+    deadband: Annotated[float, Field(ge=0.0, lt=1.0)] = Field(
+        default=0.05, description="The axis size below which no motion is commanded [-]."
+    )
+    limits: LimitsModel = Field(
+        default=LimitsModel(), description="The limits of its position; from the URDF if left out."
+    )
+
+
+class LinkageModel(Model):
+    """A further joint that moves with an actuator."""
+
+    joint: Text = Field(description="The name of the joint in the URDF.")
+    actuator: Name = Field(description="The name of the actuator that it follows.")
+    drive: DriveModel = Field(
+        default=DirectModel(type="direct"), description="The map from actuator to joint."
+    )
+
+
+class ArmModel(Model):
+    """The arm: its URDF, where it stands, what drives it."""
+
+    urdf: Text = Field(description="The URDF file, relative to this file.")
+    package_dirs: tuple[Text, ...] = Field(
+        default=(), description="The folders in which package:// meshes of the URDF are looked up."
+    )
+    base_pose: Pose = Field(
+        default=Pose(), description="The pose of the arm's root link in the world."
+    )
+    actuators: Annotated[
+        tuple[ActuatorModel, ...], Field(min_length=1, max_length=MAX_ACTUATORS)
+    ] = Field(description="The actuators, in the order of the arrays on the wire.")
+    linkages: tuple[LinkageModel, ...] = Field(
+        default=(), description="The further joints that follow an actuator."
+    )
+
+
+class ColumnModel(Model):
+    """A column of a log and how its numbers become site units."""
+
+    column: Text = Field(description="The name of the column in the header.")
+    scale: Number = Field(
+        default=1.0, description="The factor from the column's unit to the site's."
+    )
+    offset: Number = Field(default=0.0, description="The amount added after scaling [site unit].")
+
+
+def _column_kind(value: Any) -> str:
+    return "column-map" if isinstance(value, dict | ColumnModel) else "column-name"
+
+
+Column = Annotated[
+    Annotated[Text, Tag("column-name")] | Annotated[ColumnModel, Tag("column-map")],
+    Discriminator(_column_kind),
+]
+
+
+class LogModel(Model):
+    """How the columns of a CSV log become messages."""
+
+    time: Column = Field(description="The column of time; its scale makes it [s].")
+    joystick: dict[str, Column] = Field(
+        description="The column of each actuator's joystick axis, -1 to 1, by actuator name."
+    )
+    actuators: dict[str, Column] = Field(
+        description="The column of each actuator's position, by actuator name."
+    )
+
+
+class SiteModel(Model):
+    """A machine at a site: its arm, its keys, its scene and how it is guarded."""
+
+    site: Name = Field(description="The name of the site.")
+    machine: Name = Field(description="The name of the machine.")
+    zenoh: ZenohModel = Field(default=ZenohModel(), description="The Zenoh session.")
+    keys: KeysModel = Field(description="The Zenoh keys.")
+    format: Literal["json", "ros2"] = Field(
+        default="json", description="The format of the input messages: json, or ros2 (CDR)."
+    )
+    arm: ArmModel = Field(description="The arm.")
+    scene: Text = Field(description="The scene file, relative to this file.")
+    inputs: InputsModel = Field(default=InputsModel(), description="The limits of plausible input.")
+    joystick: JoystickModel = Field(default=JoystickModel(), description="The joystick processing.")
+    rampe: RampeModel = Field(default=RampeModel(), description="The estimator.")
+    stopping: StoppingModel = Field(default=StoppingModel(), description="The stopping forecast.")
+    sweep: SweepModel = Field(default=SweepModel(), description="The certified sweep.")
+    alerts: AlertsModel = Field(default=AlertsModel(), description="The alarm logic.")
+    log: LogModel | None = Field(
+        default=None, description="The columns of this machine's CSV logs."
+    )

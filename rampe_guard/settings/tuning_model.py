@@ -1,0 +1,220 @@
+"""The optional blocks of a site file; every default is the one in core/config.py."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from rampe_guard.core.config import (
+    AlertConfig,
+    InputConfig,
+    JoystickConfig,
+    PriorConfig,
+    RampeConfig,
+    StoppingConfig,
+    SweepConfig,
+)
+from rampe_guard.settings.model import Fraction, Model, Seconds, Text
+
+_JOYSTICK = JoystickConfig()
+_PRIOR = PriorConfig()
+_RAMPE = RampeConfig()
+_SWEEP = SweepConfig()
+_ALERTS = AlertConfig()
+_INPUTS = InputConfig()
+
+_Timeout = Annotated[float, Field(ge=0.02, le=60.0)]
+_Steps = Annotated[int, Field(ge=1, le=100)]
+_Share = Annotated[float, Field(gt=0.0, le=10.0)]
+_Weight = Annotated[float, Field(gt=0.0, le=1e6)]
+_Tolerance = Annotated[float, Field(ge=1e-6, le=1.0)]
+_Observations = Annotated[tuple[Literal["q"], ...], Field(min_length=1, max_length=1)]
+
+
+class JoystickModel(Model):
+    """How axes become a category."""
+
+    filter_s: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
+        default=_JOYSTICK.filter_s, description="The time constant of the axis low-pass filter [s]."
+    )
+    release_ratio: Annotated[float, Field(gt=0.0, le=1.0)] = Field(
+        default=_JOYSTICK.release_ratio,
+        description="The share of the deadband below which a lever counts as released [-].",
+    )
+    debounce_s: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
+        default=_JOYSTICK.debounce_s, description="The time a category must last to count [s]."
+    )
+
+
+class PriorModel(Model):
+    """What is believed of a category before it was seen."""
+
+    displacement: _Share = Field(
+        default=_PRIOR.displacement,
+        description="The expected size of a displacement [share of range].",
+    )
+    spread: _Share = Field(
+        default=_PRIOR.spread,
+        description="The standard deviation of a displacement about its model [share of range].",
+    )
+    weight: _Weight = Field(
+        default=_PRIOR.weight,
+        description="The number of observations the belief in the mean is worth.",
+    )
+    slope_weight: _Weight = Field(
+        default=_PRIOR.slope_weight,
+        description="The number of observations the belief is worth that displacement does not "
+        "depend on position.",
+    )
+
+
+class RampeModel(Model):
+    """The estimator of the operator's next displacement."""
+
+    n_init: Annotated[int, Field(ge=1, le=1000)] = Field(
+        default=_RAMPE.n_init,
+        description="The occurrences of a category before its first forecast.",
+    )
+    basis: Literal["affine"] = Field(
+        default="affine", description="The regressor: affine, that is the observations and 1."
+    )
+    forgetting: Annotated[float, Field(ge=0.5, le=1.0)] = Field(
+        default=_RAMPE.forgetting,
+        description="The forgetting factor per occurrence, 1 for none [-].",
+    )
+    tol: Annotated[float, Field(gt=0.0, lt=1.0)] = Field(
+        default=_RAMPE.tol,
+        description="The relative size below which a singular value counts as 0 [-].",
+    )
+    prior: PriorModel = Field(
+        default=PriorModel(), description="The belief before a category was ever seen."
+    )
+    observations: _Observations = Field(
+        default=("q",), description="The quantities the regressor sees: q, the actuator positions."
+    )
+
+
+class StoppingModel(Model):
+    """The stopping forecast: where the arm stops if the operator lets go now."""
+
+    reaction_s: Annotated[float, Field(ge=0.0, le=5.0)] = Field(
+        default=StoppingConfig().reaction_s, description="The operator's reaction time [s]."
+    )
+
+
+class SweepModel(Model):
+    """Tolerances and budget of the certified sweep."""
+
+    tolerance_m: _Tolerance = Field(
+        default=_SWEEP.tolerance_m, description="The tolerance of a contact [m]."
+    )
+    clearance_tolerance_m: _Tolerance = Field(
+        default=_SWEEP.clearance_tolerance_m,
+        description="The tolerance of a reported clearance [m].",
+    )
+    max_queries: Annotated[int, Field(ge=10, le=10_000_000)] = Field(
+        default=_SWEEP.max_queries,
+        description="The largest number of clearance queries of one sweep.",
+    )
+
+
+class AlertsModel(Model):
+    """When an alert is raised, held and given back."""
+
+    warning_probability: Annotated[float, Field(gt=0.0, lt=1.0)] = Field(
+        default=_ALERTS.warning_probability,
+        description="The smallest probability of contact that warns [-].",
+    )
+    caution_probability: Annotated[float, Field(gt=0.0, lt=1.0)] = Field(
+        default=_ALERTS.caution_probability,
+        description="The smallest probability of contact that is a caution [-].",
+    )
+    debounce_steps: _Steps = Field(
+        default=_ALERTS.debounce_steps,
+        description="The evaluations in a row before a caution or warning is published.",
+    )
+    imminent_steps: _Steps = Field(
+        default=_ALERTS.imminent_steps,
+        description="The evaluations in a row before an imminent alert is published.",
+    )
+    off_delay_s: Seconds = Field(
+        default=_ALERTS.off_delay_s,
+        description="The time a cause must be gone before its alert goes [s].",
+    )
+    min_on_s: Seconds = Field(
+        default=_ALERTS.min_on_s, description="The shortest life of a published alert [s]."
+    )
+    deadband_m: Annotated[float, Field(ge=0.0, le=100.0)] = Field(
+        default=_ALERTS.deadband_m,
+        description="The extra clearance to regain before an alert goes [m].",
+    )
+    deadband_s: Seconds = Field(
+        default=_ALERTS.deadband_s,
+        description="The extra time to collision to regain before an alert goes [s].",
+    )
+    deadband_probability: Fraction = Field(
+        default=_ALERTS.deadband_probability,
+        description="The amount by which the probability must fall below the threshold [-].",
+    )
+    republish_s: Annotated[float, Field(ge=0.02, le=10.0)] = Field(
+        default=_ALERTS.republish_s,
+        description="The period of repeats while an alert is active [s].",
+    )
+    expires_after_s: Annotated[float, Field(gt=0.0, le=60.0)] = Field(
+        default=_ALERTS.expires_after_s,
+        description="The age at which a consumer must no longer trust an alert [s].",
+    )
+    horizon_s: Annotated[float, Field(gt=0.0, le=600.0)] = Field(
+        default=_ALERTS.horizon_s,
+        description="The time to contact beyond which an alert is a caution at most [s].",
+    )
+
+
+class JoystickInputModel(Model):
+    """Supervision of the joystick messages."""
+
+    timeout_s: _Timeout = Field(
+        default=_INPUTS.joystick_timeout_s,
+        description="The silence after which monitoring stops [s].",
+    )
+    on_change: bool = Field(
+        default=_INPUTS.joystick_on_change,
+        description="True if the joystick publishes only when it moves; alive_key is needed then.",
+    )
+    alive_key: Text | None = Field(
+        default=None,
+        description="The exact key of the publisher's liveliness token: its loss is silence.",
+    )
+
+
+class ActuatorsInputModel(Model):
+    """Supervision of the actuator messages."""
+
+    timeout_s: _Timeout = Field(
+        default=_INPUTS.actuators_timeout_s,
+        description="The silence after which monitoring stops [s].",
+    )
+
+
+class InputsModel(Model):
+    """Limits of plausible input."""
+
+    joystick: JoystickInputModel = Field(
+        default=JoystickInputModel(), description="The supervision of the joystick messages."
+    )
+    actuators: ActuatorsInputModel = Field(
+        default=ActuatorsInputModel(), description="The supervision of the actuator messages."
+    )
+    position_slack: Annotated[float, Field(ge=0.0, le=10.0)] = Field(
+        default=_INPUTS.position_slack,
+        description="The amount a position may lie beyond its limits [share of range].",
+    )
+    speed_slack: Annotated[float, Field(ge=1.0, le=1000.0)] = Field(
+        default=_INPUTS.speed_slack,
+        description="The largest measured speed [multiples of max_velocity].",
+    )
+    max_stamp_jump_s: Annotated[float, Field(gt=0.0, le=3600.0)] = Field(
+        default=_INPUTS.max_stamp_jump_s,
+        description="The largest step of a stamp beyond the time that really passed [s].",
+    )
