@@ -1,0 +1,165 @@
+"""CSV logs through the mapping of the site file: rows to samples, or a reason why not.
+
+A log is checked as a whole before a single row is used: a column whose values cannot be an
+axis, or a position, in more than a few rows is the wrong column or the wrong scale, and
+learning from it would be worse than no log.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rampe_guard.core.types import ActuatorSample, FloatArray, JoystickSample
+from rampe_guard.errors import LogError
+from rampe_guard.settings import ColumnMap, Site
+
+_WRONG_SHARE = 0.02
+"""More impossible rows than this in one column is no glitch."""
+_AXIS_LIMIT = 1.05
+_CLEAR_COMMAND = 0.4
+_AGAINST_SHARE = 0.6
+
+
+@dataclass(frozen=True, slots=True)
+class CsvLog:
+    """A log as arrays: k rows, m axes, n actuators.
+
+    Attributes:
+        path: where it came from.
+        time_s: (k,) as logged [s].
+        axes: (k, m) [-].
+        position: (k, n) [unit].
+        warnings: one per row that was left out, naming its line.
+    """
+
+    path: str
+    time_s: FloatArray
+    axes: FloatArray
+    position: FloatArray
+    warnings: tuple[str, ...]
+
+    def samples(self) -> Iterator[tuple[JoystickSample, ActuatorSample]]:
+        """One pair of samples a row; they arrive when they were stamped."""
+        for t, u, q in zip(self.time_s.tolist(), self.axes, self.position, strict=True):
+            yield JoystickSample(t, u, t), ActuatorSample(t, q, None, t)
+
+
+def read_csv_log(site: Site, path: str | Path, limits: FloatArray) -> CsvLog:
+    """Read a CSV log and check that it can be what the site file says it is.
+
+    Args:
+        site: with a `log` mapping.
+        path: the CSV file, with a header.
+        limits: actuator limits (n, 2) [unit].
+
+    Raises:
+        LogError: no mapping, unreadable, a column is missing, or its values are impossible.
+    """
+    mapping = site.log
+    if mapping is None:
+        raise LogError(f"{site.path}: no 'log' mapping; name the CSV columns under 'log:'")
+    names = site.actuator_names
+    columns = [mapping.time]
+    columns += [mapping.joystick[n] for n in names] + [mapping.actuators[n] for n in names]
+    rows, warnings = _rows(Path(path), columns)
+    n = len(names)
+    axes = np.zeros((len(rows), site.guard.axes))
+    for j, actuator in enumerate(site.guard.actuators):
+        axes[:, actuator.axis] = rows[:, 1 + j]
+    log = CsvLog(str(path), rows[:, 0], axes, rows[:, 1 + n :], tuple(warnings))
+    _check(site, log, limits)
+    return log
+
+
+def _rows(path: Path, columns: list[ColumnMap]) -> tuple[FloatArray, list[str]]:
+    """Mapped values (k, columns) of every whole row, and a warning for every other."""
+    rows, warnings = [], []
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            reader = csv.DictReader(file)
+            header = reader.fieldnames or []
+            missing = [c.column for c in columns if c.column not in header]
+            if missing:
+                raise LogError(
+                    f"{path}:1: no column {missing[0]!r}; the header has {', '.join(header)}"
+                )
+            for row in reader:
+                try:
+                    if None in row or None in row.values():
+                        raise ValueError("wrong number of fields")
+                    values = [float(row[c.column]) * c.scale + c.offset for c in columns]
+                    if not all(map(math.isfinite, values)):
+                        raise ValueError("a value is not finite")
+                except ValueError as error:
+                    warnings.append(f"{path}:{reader.line_num}: row left out: {error}")
+                else:
+                    rows.append(values)
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise LogError(f"{path}: cannot be read: {error}") from None
+    if not rows:
+        raise LogError(f"{path}: no usable row")
+    return np.array(rows), warnings
+
+
+def _check(site: Site, log: CsvLog, limits: FloatArray) -> None:
+    mapping = site.log
+    if mapping is None:
+        return
+    problems = []
+    slack = site.guard.inputs.position_slack
+    for j, actuator in enumerate(site.guard.actuators):
+        name = actuator.name
+        u, q = log.axes[:, actuator.axis], log.position[:, j]
+        problems += _outside(mapping.joystick[name], u, -_AXIS_LIMIT, _AXIS_LIMIT, "an axis -1…1")
+        low, high = limits[j]
+        width = (high - low) * slack if np.isfinite(high - low) else 0.0
+        problems += _outside(
+            mapping.actuators[name], q, low - width, high + width, f"the limits of {name!r}"
+        )
+        problems += _against(mapping.joystick[name], name, u * actuator.sign, q)
+    if problems:
+        text = "\n  ".join(problems)
+        raise LogError(
+            f"{log.path}: this cannot be what the site file's 'log' says:\n  {text}\n"
+            f"  Are columns swapped, or is a scale wrong? Nothing was learned from it."
+        )
+
+
+def _outside(
+    column: ColumnMap, values: FloatArray, low: float, high: float, what: str
+) -> list[str]:
+    outside = (values < low) | (values > high)
+    share = float(outside.mean())
+    if share <= _WRONG_SHARE:
+        return []
+    worst = values[np.argmax(np.maximum(low - values, values - high))]
+    raw = (worst - column.offset) / column.scale
+    return [
+        f"column {column.column!r}: {share:.0%} of the rows are outside {what}"
+        f" (worst {worst:.3g}, logged as {raw:.4g})"
+    ]
+
+
+def _against(column: ColumnMap, name: str, u: FloatArray, q: FloatArray) -> list[str]:
+    """A lever that mostly moves its actuator the other way has the wrong sign or column."""
+    lag = 3  # rows: the actuator answers late, whatever the rate of the log
+    if len(u) <= 2 * lag:
+        return []
+    moved = q[2 * lag :] - q[lag:-lag]
+    commanded = u[lag:-lag]
+    clear = (np.abs(commanded) > _CLEAR_COMMAND) & (moved != 0.0)
+    if clear.sum() < len(u) * 0.01:
+        return []
+    against = float((commanded[clear] * moved[clear] < 0).mean())
+    if against < _AGAINST_SHARE:
+        return []
+    return [
+        f"column {column.column!r}: {name!r} moves against its command in {against:.0%}"
+        " of the rows: wrong sign or wrong column"
+    ]

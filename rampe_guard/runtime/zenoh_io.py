@@ -1,0 +1,276 @@
+"""The only importer of zenoh: sessions, inboxes, publishers and queries in our own terms.
+
+Nothing is ever computed in a Zenoh callback. Every subscriber and queryable fills a ring
+channel, which drops its oldest message when full and so cannot stall the session; whoever
+owns the `Inbox` drains it in a thread of his own.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Literal, Self
+
+import zenoh
+
+from rampe_guard.errors import ConnectionFailedError, SettingsError
+from rampe_guard.settings import ZenohSettings
+
+_TRY_MS = 1000
+"""One attempt to connect; longer ones cannot be interrupted by a signal."""
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A payload as it came, with the exact key that it was put on."""
+
+    key: str
+    payload: bytes
+
+
+class Inbox:
+    """Messages on one key expression, newest kept when they come faster than they are drained."""
+
+    def __init__(self, session: zenoh.Session, key: str, capacity: int) -> None:
+        self._subscriber = session.declare_subscriber(key, zenoh.handlers.RingChannel(capacity))
+        self._capacity = capacity
+        self.overruns = 0
+
+    def drain(self) -> list[Message]:
+        """All messages that wait, oldest first; never blocks."""
+        messages: list[Message] = []
+        while len(messages) < self._capacity:
+            sample = self._subscriber.try_recv()
+            if sample is None:
+                break
+            if sample.kind == zenoh.SampleKind.PUT:
+                messages.append(Message(str(sample.key_expr), sample.payload.to_bytes()))
+        if len(messages) == self._capacity:
+            self.overruns += 1  # a full ring has most likely dropped some
+        return messages
+
+
+class Liveness:
+    """Whether a liveliness token exists on one key; None until anything was heard of it."""
+
+    def __init__(self, session: zenoh.Session, key: str) -> None:
+        self._subscriber = session.liveliness().declare_subscriber(
+            key, zenoh.handlers.RingChannel(16), history=True
+        )
+        self.alive: bool | None = None
+
+    def poll(self) -> bool | None:
+        """The newest state; never blocks."""
+        while (sample := self._subscriber.try_recv()) is not None:
+            self.alive = sample.kind == zenoh.SampleKind.PUT
+        return self.alive
+
+
+class Outbox:
+    """A publisher on one key; ``put`` never waits for a slow subscriber."""
+
+    def __init__(
+        self, session: zenoh.Session, key: str, schema: str | None, *, urgent: bool
+    ) -> None:
+        encoding = zenoh.Encoding.APPLICATION_JSON
+        self._publisher = session.declare_publisher(
+            key,
+            encoding=encoding if schema is None else encoding.with_schema(schema),
+            congestion_control=zenoh.CongestionControl.DROP,
+            priority=zenoh.Priority.REAL_TIME if urgent else zenoh.Priority.DATA,
+            express=True,
+        )
+
+    def put(self, payload: bytes) -> None:
+        """Send; lost silently while no router is there."""
+        self._publisher.put(payload)
+
+    @property
+    def heard(self) -> bool:
+        """At least one subscriber matches now."""
+        return bool(self._publisher.matching_status)
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """A query that waits for an answer."""
+
+    key: str
+    payload: bytes | None
+    _query: Any
+
+    def reply(self, payload: bytes) -> None:
+        """Answer it."""
+        with contextlib.suppress(zenoh.ZError):  # whoever asked may be gone
+            self._query.reply(self.key, payload, encoding=zenoh.Encoding.APPLICATION_JSON)
+        self._query.drop()
+
+    def refuse(self, text: str) -> None:
+        """Answer with an error."""
+        with contextlib.suppress(zenoh.ZError):
+            self._query.reply_err(text.encode(), encoding=zenoh.Encoding.TEXT_PLAIN)
+        self._query.drop()
+
+
+class Desk:
+    """A queryable on one key, drained by its owner."""
+
+    def __init__(self, session: zenoh.Session, key: str) -> None:
+        self._key = key
+        self._queryable = session.declare_queryable(key, zenoh.handlers.RingChannel(256))
+
+    def drain(self) -> list[Request]:
+        """All requests that wait; never blocks."""
+        requests = []
+        while (query := self._queryable.try_recv()) is not None:
+            payload = None if query.payload is None else query.payload.to_bytes()
+            requests.append(Request(self._key, payload, query))
+        return requests
+
+
+class Bus:
+    """One Zenoh session. A context manager: closing it ends every inbox and outbox."""
+
+    def __init__(self, session: zenoh.Session, *, client: bool) -> None:
+        self._session = session
+        self._client = client
+        self._kept: list[Any] = []
+
+    @classmethod
+    def open(cls, settings: ZenohSettings) -> Self:
+        """Try to connect once, for about a second.
+
+        Raises:
+            ConnectionFailedError: nobody answered.
+            SettingsError: the Zenoh configuration is not valid.
+        """
+        config = _config(settings)
+        client = json.loads(config.get_json("mode")) == "client"
+        try:
+            return cls(zenoh.open(config), client=client)
+        except zenoh.ZError as error:
+            where = settings.config or ", ".join(settings.connect) or "no endpoint"
+            reason = str(error).split(" at /")[0]
+            raise ConnectionFailedError(f"no Zenoh router at {where}: {reason}") from None
+
+    @classmethod
+    def open_retrying(
+        cls,
+        settings: ZenohSettings,
+        stopped: Callable[[], bool],
+        say: Callable[[str], None],
+        wait: Callable[[float], object],
+    ) -> Self | None:
+        """Try until a router answers; None when ``stopped`` became true first."""
+        while not stopped():
+            try:
+                return cls.open(settings)
+            except ConnectionFailedError as error:
+                say(str(error))
+                wait(0.5)
+        return None
+
+    @property
+    def connected(self) -> bool:
+        """A client has a router (a peer needs none)."""
+        return not self._client or bool(self._session.info.routers_zid())
+
+    def inbox(self, key: str, capacity: int = 256) -> Inbox:
+        """Subscribe to a key (or, for viewers, a key expression)."""
+        return Inbox(self._session, key, capacity)
+
+    def outbox(self, key: str, schema: str | None = None, *, urgent: bool = False) -> Outbox:
+        """Publish on a key; ``urgent`` is for alerts."""
+        return Outbox(self._session, key, schema, urgent=urgent)
+
+    def desk(self, key: str) -> Desk:
+        """Answer queries on a key."""
+        return Desk(self._session, key)
+
+    def liveness(self, key: str) -> Liveness:
+        """Watch the liveliness token on a key."""
+        return Liveness(self._session, key)
+
+    def declare_alive(self, key: str) -> None:
+        """Hold a liveliness token on a key for as long as the session lives."""
+        self._kept.append(self._session.liveliness().declare_token(key))
+
+    def ask(self, key: str, payload: bytes | None = None, timeout_s: float = 2.0) -> list[bytes]:
+        """Query a key; returns the answers.
+
+        Raises:
+            ConnectionFailedError: the answer was an error (its text is in the message).
+        """
+        answers = []
+        for reply in self._session.get(key, payload=payload, timeout=timeout_s):
+            if reply.ok is not None:
+                answers.append(reply.ok.payload.to_bytes())
+            elif (
+                reply.err is not None
+                and "timeout" not in (text := str(reply.err.payload.to_string())).lower()
+            ):
+                raise ConnectionFailedError(f"{key} answered: {text}")
+        return answers
+
+    def close(self) -> None:
+        """End the session; a session left open would hang the interpreter's exit."""
+        self._session.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+@contextlib.contextmanager
+def router(endpoints: Sequence[str]) -> Iterator[None]:
+    """Be a Zenoh router on these endpoints (in a process of its own: it needs the whole GIL).
+
+    Raises:
+        ConnectionFailedError: an endpoint cannot be listened on.
+    """
+    config = _blank("router")
+    config.insert_json5("listen/endpoints", json.dumps(list(endpoints)))
+    try:
+        session = zenoh.open(config)
+    except zenoh.ZError as error:
+        raise ConnectionFailedError(f"cannot listen on {', '.join(endpoints)}: {error}") from None
+    try:
+        yield
+    finally:
+        session.close()
+
+
+def _config(settings: ZenohSettings) -> zenoh.Config:
+    if settings.config is not None:
+        try:
+            config = zenoh.Config.from_file(settings.config)
+        except zenoh.ZError as error:
+            raise SettingsError(f"{settings.config}: not a Zenoh configuration: {error}") from None
+    else:
+        config = _blank(settings.mode)
+        config.insert_json5("connect/endpoints", json.dumps(list(settings.connect)))
+    config.insert_json5("connect/timeout_ms", str(_TRY_MS))
+    config.insert_json5("connect/exit_on_failure", "true")
+    retry = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2}
+    config.insert_json5("connect/retry", json.dumps(retry))
+    return config
+
+
+def _blank(mode: Literal["client", "peer", "router"]) -> zenoh.Config:
+    """A configuration that listens nowhere and finds nobody by itself."""
+    config = zenoh.Config()
+    config.insert_json5("mode", json.dumps(mode))
+    config.insert_json5("listen/endpoints", "[]")
+    config.insert_json5("scouting/multicast/enabled", "false")
+    config.insert_json5("scouting/gossip/enabled", "false")
+    return config
