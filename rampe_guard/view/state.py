@@ -1,0 +1,182 @@
+"""What the terminal shows, as one frozen value. All times are on the clock of the viewer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from rampe_guard.core.alarm import Level
+
+
+class Protection(Enum):
+    """What the operator can rely on."""
+
+    MONITORING = "monitoring"
+    DEGRADED = "degraded"
+    NOT_MONITORING = "not monitoring"
+    UNAVAILABLE = "unavailable"  # the guard says nothing, or nothing fresh
+
+
+@dataclass(frozen=True, slots=True)
+class ActuatorView:
+    """One actuator; what is not known is None.
+
+    Attributes:
+        name: as in the site file.
+        unit: "rad" or "m".
+        lower: limit of travel [unit]; None = endless.
+        upper: the same.
+        position: [unit].
+        velocity: [unit/s].
+        command: of the lever, in the actuator's direction, in [-1, 1].
+        sign: direction in the category, -1, 0 or 1.
+        displacement: predicted for this primitive, x̂ [unit].
+        spread: of the prediction [unit].
+        endpoint: predicted [unit].
+    """
+
+    name: str
+    unit: str = "rad"
+    lower: float | None = None
+    upper: float | None = None
+    position: float | None = None
+    velocity: float | None = None
+    command: float | None = None
+    sign: int | None = None
+    displacement: float | None = None
+    spread: float | None = None
+    endpoint: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class AlertView:
+    """One active alert.
+
+    Attributes:
+        alert_id: names the alert; the zone names its line.
+        zone: keep-out object.
+        level: how urgent.
+        source: stopping, intent, next, contact or system.
+        link: of the arm, or None.
+        time_to_collision_s: [s].
+        probability: of contact [-].
+        clearance_now_m: to the margin [m].
+        attention: nobody has acknowledged it.
+        trusted: the guard says that its quality is good.
+        text: the guard's own words.
+        received_s: when the message came [s].
+        expires_after_s: age at which it must not be trusted [s].
+        stamped_unix_s: when it was published, on the clock of the guard [s].
+        warned_unix_s: when it first warned, on the same clock; None below warning.
+        came_true: the arm went in.
+    """
+
+    alert_id: str
+    zone: str
+    level: Level
+    source: str
+    link: str | None = None
+    time_to_collision_s: float | None = None
+    probability: float | None = None
+    clearance_now_m: float | None = None
+    attention: bool = True
+    trusted: bool = True
+    text: str = ""
+    received_s: float = 0.0
+    expires_after_s: float = 1.0
+    stamped_unix_s: float = 0.0
+    warned_unix_s: float | None = None
+    came_true: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class HealthView:
+    """The last heartbeat.
+
+    Attributes:
+        protection: what it says of monitoring.
+        reasons: in words.
+        boot_id: changes when the guard restarts.
+        received_s: when it came [s].
+        joystick_age_s: of the newest joystick sample then [s].
+        actuators_age_s: the same for the actuators [s].
+        loop_p50_ms: loop time [ms].
+        loop_p99_ms: the same [ms].
+        sweep_p50_ms: sweep time [ms].
+        sweep_p99_ms: the same [ms].
+        version: of the guard.
+    """
+
+    protection: Protection
+    reasons: tuple[str, ...]
+    boot_id: str
+    received_s: float
+    joystick_age_s: float | None = None
+    actuators_age_s: float | None = None
+    loop_p50_ms: float | None = None
+    loop_p99_ms: float | None = None
+    sweep_p50_ms: float | None = None
+    sweep_p99_ms: float | None = None
+    version: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class EventView:
+    """Something that happened at ``at_s`` [s], with the level that colours it."""
+
+    at_s: float
+    level: Level
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class ViewState:
+    """Everything on the screen.
+
+    Attributes:
+        machine: its name.
+        site: its name.
+        now_s: time of the picture [s].
+        actuators: in site order.
+        observations: primitives behind the prediction, or None without one.
+        position_received_s: when positions last came [s]; None = never.
+        prediction_received_s: when a prediction last came [s]; None = none in force.
+        health: last heartbeat; None = never one.
+        alerts: active ones, at most one per zone.
+        events: newest first.
+        expires_after_s: age at which heartbeat, position and command are stale [s].
+    """
+
+    machine: str
+    site: str
+    now_s: float
+    actuators: tuple[ActuatorView, ...]
+    observations: int | None = None
+    position_received_s: float | None = None
+    prediction_received_s: float | None = None
+    health: HealthView | None = None
+    alerts: tuple[AlertView, ...] = ()
+    events: tuple[EventView, ...] = ()
+    expires_after_s: float = 1.0
+
+    @property
+    def silence_s(self) -> float | None:
+        """Time since the last heartbeat [s]; None if there never was one."""
+        return None if self.health is None else self.now_s - self.health.received_s
+
+    @property
+    def protection(self) -> Protection:
+        """What can be relied on now: a heartbeat that is too old protects nobody."""
+        if self.health is None or self.silence_s is None or self.silence_s > self.expires_after_s:
+            return Protection.UNAVAILABLE
+        return self.health.protection
+
+    @property
+    def position_stale(self) -> bool:
+        """Positions are missing or too old to be shown as present."""
+        came_s = self.position_received_s
+        return came_s is None or self.now_s - came_s > self.expires_after_s
+
+    def alert_stale(self, alert: AlertView) -> bool:
+        """An alert that was not repeated in time: still shown, no longer current."""
+        return self.now_s - alert.received_s > alert.expires_after_s
