@@ -90,14 +90,9 @@ def _rows(path: Path, columns: list[ColumnMap]) -> tuple[FloatArray, list[str]]:
                     f"{path}:1: no column {missing[0]!r}; the header has {', '.join(header)}"
                 )
             for row in reader:
-                try:
-                    if None in row or None in row.values():
-                        raise ValueError("wrong number of fields")
-                    values = [float(row[c.column]) * c.scale + c.offset for c in columns]
-                    if not all(map(math.isfinite, values)):
-                        raise ValueError("a value is not finite")
-                except ValueError as error:
-                    warnings.append(f"{path}:{reader.line_num}: row left out: {error}")
+                values, problem = _mapped(row, columns)
+                if problem:
+                    warnings.append(f"{path}:{reader.line_num}: row left out: {problem}")
                 else:
                     rows.append(values)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
@@ -105,6 +100,19 @@ def _rows(path: Path, columns: list[ColumnMap]) -> tuple[FloatArray, list[str]]:
     if not rows:
         raise LogError(f"{path}: no usable row")
     return np.array(rows), warnings
+
+
+def _mapped(row: dict[str, str], columns: list[ColumnMap]) -> tuple[list[float], str]:
+    """Mapped values of one row, and what is wrong with it (empty if nothing)."""
+    if None in row or None in row.values():  # how csv marks too many and too few fields
+        return [], "wrong number of fields"
+    try:
+        values = [float(row[c.column]) * c.scale + c.offset for c in columns]
+    except ValueError as error:
+        return [], str(error)
+    if not all(map(math.isfinite, values)):
+        return [], "a value is not finite"
+    return values, ""
 
 
 def _check(site: Site, log: CsvLog, limits: FloatArray) -> None:
@@ -141,8 +149,10 @@ def _outside(
     worst = values[np.argmax(np.maximum(low - values, values - high))]
     raw = (worst - column.offset) / column.scale
     return [
-        f"column {column.column!r}: {share:.0%} of the rows are outside {what}"
-        f" (worst {worst:.3g}, logged as {raw:.4g})"
+        (
+            f"column {column.column!r}: {share:.0%} of the rows are outside {what}"
+            f" (worst {worst:.3g}, logged as {raw:.4g})"
+        )
     ]
 
 
@@ -160,6 +170,8 @@ def _against(column: ColumnMap, name: str, u: FloatArray, q: FloatArray) -> list
     if against < _AGAINST_SHARE:
         return []
     return [
-        f"column {column.column!r}: {name!r} moves against its command in {against:.0%}"
-        " of the rows: wrong sign or wrong column"
+        (
+            f"column {column.column!r}: {name!r} moves against its command in {against:.0%}"
+            " of the rows: wrong sign or wrong column"
+        )
     ]
