@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from rampe_guard.core.events import SYSTEM_ZONE
 from rampe_guard.core.scene import (
     ActuatorLimit,
     Box,
@@ -109,6 +110,9 @@ def _scene(document: Document, actuators: Sequence[str], directory: Path, path: 
             what = f"{show(item.name)} is the name of another object (line {there})"
             problems.add((*where, "name"), what, "give every object a name of its own")
         first.setdefault(item.name, index)
+        if item.name == SYSTEM_ZONE:
+            what = f"{show(item.name)} is the zone of the guard's own alerts"
+            problems.add((*where, "name"), what, "give another name")
         value = builder.build(item, where)
         if value is not None:
             objects.append(value)

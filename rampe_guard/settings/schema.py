@@ -1,20 +1,21 @@
 """JSON Schemas of site and scene files, for editors.
 
-``python -m rampe_guard.settings.schema config`` writes them into ``config``.
+``python -m rampe_guard.settings config`` writes them into ``config``.
 """
 
 from __future__ import annotations
 
 import json
-import sys
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema
 
 from rampe_guard.settings.scene_model import SceneModel
 from rampe_guard.settings.site_model import SiteModel
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -50,7 +51,3 @@ def write_schemas(directory: Path) -> None:
 def _schema(model: type[BaseModel], title: str) -> dict[str, Any]:
     schema = model.model_json_schema(by_alias=True, schema_generator=_Untitled)
     return {"$schema": DIALECT, **schema, "title": title}
-
-
-if __name__ == "__main__":
-    write_schemas(Path(sys.argv[1] if len(sys.argv) > 1 else "config"))

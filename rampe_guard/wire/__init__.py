@@ -1,0 +1,46 @@
+"""The message contract: msgspec structs, JSON in and out, JSON Schema.
+
+What arrives is decoded strictly and refused with a reason; what leaves is checked to be
+finite. Names carry units (``_s``, ``_m``, ``_ms``, ``_hz``); actuator values are in the
+site's units.
+"""
+
+from rampe_guard.wire.alert import Alert
+from rampe_guard.wire.codec import MAX_PAYLOAD_BYTES, decode, encode
+from rampe_guard.wire.health import Heartbeat, InputAges, InputRates, Quantiles, Reason
+from rampe_guard.wire.inputs import (
+    ActuatorsMessage,
+    JoystickMessage,
+    decode_actuators,
+    decode_joystick,
+)
+from rampe_guard.wire.prediction import Prediction, PredictionSweep
+from rampe_guard.wire.schema import json_schemas
+from rampe_guard.wire.state import State
+from rampe_guard.wire.sweep import SweepReply, SweepRequest, decode_sweep_request
+from rampe_guard.wire.text import MAX_TEXT, alert_text
+
+__all__ = [
+    "MAX_PAYLOAD_BYTES",
+    "MAX_TEXT",
+    "ActuatorsMessage",
+    "Alert",
+    "Heartbeat",
+    "InputAges",
+    "InputRates",
+    "JoystickMessage",
+    "Prediction",
+    "PredictionSweep",
+    "Quantiles",
+    "Reason",
+    "State",
+    "SweepReply",
+    "SweepRequest",
+    "alert_text",
+    "decode",
+    "decode_actuators",
+    "decode_joystick",
+    "decode_sweep_request",
+    "encode",
+    "json_schemas",
+]

@@ -1,0 +1,85 @@
+"""``{base}/alert``: one alert, at each transition and while it is active."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final, Literal
+
+from msgspec import Meta
+
+from rampe_guard.wire import fields as f
+from rampe_guard.wire.codec import Message
+
+SCHEMA: Final = "rampe.alert.v1"
+
+
+class Alert(Message, frozen=True, kw_only=True):
+    """One alert of one zone: the worst link and level of it."""
+
+    schema: Annotated[
+        Literal["rampe.alert.v1"], Meta(description="Name and version of this contract.")
+    ] = SCHEMA
+    alert_id: Annotated[
+        str, Meta(description="Identifies the alert from its rise to its end; for `ack`.")
+    ]
+    boot_id: f.BootId
+    seq: f.Seq
+    site: f.Site
+    machine: f.Machine
+    source: f.Source
+    level: Annotated[f.Level, Meta(description="How urgent it is.")]
+    previous_level: Annotated[f.Level, Meta(description="The level before the last change.")]
+    state: Annotated[
+        Literal["normal", "unacked", "acked", "rtn_unacked"],
+        Meta(description="Life cycle by ISA-18.2; rtn_unacked: cause gone, not yet seen."),
+    ]
+    inhibit: Annotated[
+        Literal["none", "shelved"], Meta(description="Whether it is shelved for a time.")
+    ]
+    quality: Annotated[
+        Literal["good", "degraded", "stale"],
+        Meta(description="Trust in the inputs; stale: the alert is frozen."),
+    ]
+    zone: f.Zone
+    link: f.Link
+    probability: f.Probability
+    time_to_collision_s: f.TimeToCollision
+    clearance_m: f.Clearance
+    clearance_now_m: f.ClearanceNow
+    contact_point_m: f.Point
+    contact_fraction: f.Fraction
+    any_path: f.AnyPath
+    category: Annotated[
+        tuple[Literal[-1, 0, 1], ...] | None,
+        Meta(description="Commanded direction of each actuator; null between primitives."),
+    ]
+    observations: Annotated[
+        int | None, Meta(description="Primitives of this category learned so far.")
+    ]
+    predicted_displacement: Annotated[
+        f.ByActuator | None, Meta(description="Expected displacement by actuator [rad or m].")
+    ]
+    predicted_endpoint: Annotated[
+        f.ByActuator | None, Meta(description="Expected end position by actuator [rad or m].")
+    ]
+    stamp: f.Stamp
+    published_unix_s: f.Published
+    input_age_s: Annotated[
+        float | None, Meta(description="Age of the newest input at publication [s].")
+    ]
+    compute_ms: Annotated[
+        float | None, Meta(description="Time from taking the inputs to this alert [ms].")
+    ]
+    raised_unix_s: Annotated[
+        float | None, Meta(description="Unix time at which it left normal [s].")
+    ]
+    changed_unix_s: Annotated[
+        float | None, Meta(description="Unix time of its last change of level or state [s].")
+    ]
+    acked_by: Annotated[str | None, Meta(description="Who acknowledged it.")]
+    expires_after_s: Annotated[
+        float, Meta(description="Age at which it must no longer be trusted [s].")
+    ]
+    text: Annotated[
+        str,
+        Meta(description="For a cab display.", extra_json_schema={"maxLength": 60}),
+    ]

@@ -1,0 +1,86 @@
+"""``{base}/heartbeat``: that the worker loop runs, and how well."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final, Literal
+
+from msgspec import Meta
+
+from rampe_guard.wire import fields as f
+from rampe_guard.wire.codec import Message
+
+SCHEMA: Final = "rampe.heartbeat.v1"
+
+
+class Reason(Message, frozen=True, kw_only=True):
+    """Why the status is not ok."""
+
+    code: Annotated[str, Meta(description="A word fit for a rule, such as joystick_stale.")]
+    text: Annotated[str, Meta(description="The same for people.")]
+    key: Annotated[
+        str | None, Meta(description="The Zenoh key that is silent or wrong, if one is.")
+    ] = None
+
+
+class InputAges(Message, frozen=True, kw_only=True):
+    """Ages of the newest accepted inputs; null before the first."""
+
+    joystick_s: Annotated[float | None, Meta(description="Age of the joystick's [s].")]
+    actuators_s: Annotated[float | None, Meta(description="Age of the actuators' [s].")]
+
+
+class InputRates(Message, frozen=True, kw_only=True):
+    """Accepted messages per second."""
+
+    joystick: Annotated[float | None, Meta(description="Joystick messages [1/s].")]
+    actuators: Annotated[float | None, Meta(description="Actuator messages [1/s].")]
+
+
+class Quantiles(Message, frozen=True, kw_only=True):
+    """Quantiles of a duration over the last seconds."""
+
+    p50: Annotated[float, Meta(description="Median [ms].")]
+    p99: Annotated[float, Meta(description="99th percentile [ms].")]
+
+
+class Heartbeat(Message, frozen=True, kw_only=True):
+    """Health of the guard, sent from its worker loop."""
+
+    schema: Annotated[
+        Literal["rampe.heartbeat.v1"], Meta(description="Name and version of this contract.")
+    ] = SCHEMA
+    boot_id: f.BootId
+    seq: f.Seq
+    site: f.Site
+    machine: f.Machine
+    status: Annotated[
+        Literal["ok", "degraded", "not_monitoring"],
+        Meta(description="Whether the machine is guarded; not_monitoring: it is not."),
+    ]
+    reasons: Annotated[
+        tuple[Reason, ...], Meta(description="Why not ok, the gravest first; empty when ok.")
+    ]
+    input_age_s: Annotated[InputAges, Meta(description="Ages of the inputs.")]
+    rates_hz: Annotated[InputRates, Meta(description="Rates of the inputs.")]
+    accepted: Annotated[
+        dict[str, int], Meta(description="Messages accepted since the boot, by input.")
+    ]
+    rejected: Annotated[
+        dict[str, dict[str, int]],
+        Meta(description="Messages refused since the boot, by input, then reason."),
+    ]
+    drops: Annotated[
+        int | None, Meta(description="Messages lost to full queues since the boot; null unknown.")
+    ]
+    loop_ms: Annotated[
+        Quantiles | None, Meta(description="Times of the worker loop; null before the first.")
+    ]
+    sweep_ms: Annotated[
+        Quantiles | None, Meta(description="Times of a sweep; null before the first.")
+    ]
+    tick: Annotated[int, Meta(description="Runs of the worker loop since the boot.")]
+    scene_hash: Annotated[str, Meta(description="SHA-256 of the scene in force.")]
+    config_hash: Annotated[str, Meta(description="SHA-256 of the site file and URDF.")]
+    version: Annotated[str, Meta(description="Version of rampe-guard.")]
+    published_unix_s: f.Published
+    uptime_s: Annotated[float, Meta(description="Time since the boot [s].")]

@@ -1,0 +1,75 @@
+"""``{base}/prediction``: a primitive started, ended, or its forecast changed."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final, Literal
+
+from msgspec import Meta
+
+from rampe_guard.wire import fields as f
+from rampe_guard.wire.codec import Message
+
+SCHEMA: Final = "rampe.prediction.v1"
+
+
+class PredictionSweep(Message, frozen=True, kw_only=True):
+    """What the sweep of one forecast proved about one zone."""
+
+    source: f.Source
+    zone: Annotated[str, Meta(description="Name of the keep-out object or actuator limit.")]
+    certificate: f.Certificate
+    contact_fraction: f.Fraction
+    link: f.Link
+    contact_point_m: f.Point
+    clearance_m: f.Clearance
+    clearance_now_m: f.ClearanceNow
+    probability: f.Probability
+    time_to_collision_s: f.TimeToCollision
+
+
+class Prediction(Message, frozen=True, kw_only=True):
+    """The primitive under way: what is expected of it, and what came of it."""
+
+    schema: Annotated[
+        Literal["rampe.prediction.v1"], Meta(description="Name and version of this contract.")
+    ] = SCHEMA
+    boot_id: f.BootId
+    seq: f.Seq
+    site: f.Site
+    machine: f.Machine
+    event: Annotated[
+        Literal["started", "updated", "ended"], Meta(description="What happened to it.")
+    ]
+    category: f.Category
+    observations: Annotated[int, Meta(description="Primitives of this category learned so far.")]
+    mean: Annotated[
+        f.ByActuator | None,
+        Meta(description="Expected displacement by actuator [rad or m]; null: too few seen."),
+    ]
+    scale: Annotated[
+        f.ByActuator | None,
+        Meta(description="Student-t scale by actuator [rad or m]; null: no spread is known."),
+    ]
+    dof: Annotated[
+        f.ByActuator | None, Meta(description="Student-t degrees of freedom by actuator.")
+    ]
+    start: Annotated[f.ByActuator, Meta(description="Position where it started [rad or m].")]
+    endpoint: Annotated[
+        f.ByActuator | None, Meta(description="Expected end position by actuator [rad or m].")
+    ]
+    progress: Annotated[
+        f.ByActuator, Meta(description="Displacement so far by actuator [rad or m].")
+    ]
+    displacement: Annotated[
+        f.ByActuator | None,
+        Meta(description="Displacement in the end by actuator [rad or m]; null until ended."),
+    ]
+    learned: Annotated[
+        bool | None, Meta(description="Whether it was learned from; null until ended.")
+    ]
+    any_path: f.AnyPath
+    sweeps: Annotated[
+        tuple[PredictionSweep, ...], Meta(description="Results by forecast and zone.")
+    ]
+    stamp: f.Stamp
+    published_unix_s: f.Published
