@@ -95,6 +95,7 @@ class PredictionEvent:
     prediction: PredictionSummary
     learned: bool
     sweeps: tuple[SweepSummary, ...]
+    stamp_s: float
     now_s: float
 
 

@@ -42,6 +42,7 @@ class Intention:
         self.forecast: DisplacementForecast | None = None
         self._seq = 0
         self._updated_s = float("-inf")
+        self._stamp_s = 0.0
 
     @property
     def current(self) -> Primitive | None:
@@ -57,6 +58,7 @@ class Intention:
         self, sample: JoystickSample, now_s: float, *, learn: bool
     ) -> list[PredictionEvent]:
         """Take a lever sample; ``learn`` is False while the inputs cannot be trusted."""
+        self._stamp_s = sample.stamp_s
         change = self._detector.update(sample.stamp_s, sample.axes)
         return self._changed(change, now_s, learn=learn)
 
@@ -64,6 +66,7 @@ class Intention:
         self, sample: ActuatorSample, now_s: float, *, learn: bool
     ) -> list[PredictionEvent]:
         """Take a position sample."""
+        self._stamp_s = sample.stamp_s
         self._tracker.position(sample.stamp_s, sample.position)
         change = self._detector.advance(sample.stamp_s)
         return self._changed(change, now_s, learn=learn)
@@ -141,4 +144,4 @@ class Intention:
     ) -> PredictionEvent:
         self._seq += 1
         self._updated_s = now_s
-        return PredictionEvent(event, self._seq, summary, learned, sweeps, now_s)
+        return PredictionEvent(event, self._seq, summary, learned, sweeps, self._stamp_s, now_s)

@@ -5,6 +5,7 @@ finite. Names carry units (``_s``, ``_m``, ``_ms``, ``_hz``); actuator values ar
 site's units.
 """
 
+from rampe_guard.wire.ack import Ack
 from rampe_guard.wire.alert import Alert
 from rampe_guard.wire.codec import MAX_PAYLOAD_BYTES, decode, encode
 from rampe_guard.wire.health import Heartbeat, InputAges, InputRates, Quantiles, Reason
@@ -23,6 +24,7 @@ from rampe_guard.wire.text import MAX_TEXT, alert_text
 __all__ = [
     "MAX_PAYLOAD_BYTES",
     "MAX_TEXT",
+    "Ack",
     "ActuatorsMessage",
     "Alert",
     "Heartbeat",

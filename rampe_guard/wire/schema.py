@@ -6,6 +6,7 @@ from typing import Any
 
 import msgspec
 
+from rampe_guard.wire.ack import Ack
 from rampe_guard.wire.alert import Alert
 from rampe_guard.wire.health import Heartbeat
 from rampe_guard.wire.inputs import ActuatorsMessage, JoystickMessage
@@ -18,6 +19,7 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _TAKEN: dict[str, type[msgspec.Struct]] = {
     "rampe.joystick.v1": JoystickMessage,
     "rampe.actuators.v1": ActuatorsMessage,
+    "rampe.ack.v1": Ack,
     "rampe.sweep_request.v1": SweepRequest,
 }
 _SENT: dict[str, type[msgspec.Struct]] = {
