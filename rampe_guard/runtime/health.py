@@ -1,0 +1,120 @@
+"""Health of the running daemon: rates, times and reasons, as the heartbeat tells them."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from rampe_guard import __version__, wire
+from rampe_guard.core.monitor import Health, Status
+from rampe_guard.core.types import InputName
+from rampe_guard.settings import Site
+
+_TIMES = 1000
+"""Durations kept for the quantiles: ten seconds at 100 Hz."""
+_RATE_WINDOW_S = 2.0
+
+
+class Durations:
+    """The newest durations [ms] of something, and their quantiles."""
+
+    def __init__(self) -> None:
+        self._values: deque[float] = deque(maxlen=_TIMES)
+
+    def add(self, milliseconds: float) -> None:
+        """Note one."""
+        self._values.append(milliseconds)
+
+    def quantiles(self) -> wire.Quantiles | None:
+        """Median and 99th percentile [ms]; None before the first."""
+        if not self._values:
+            return None
+        p50, p99 = np.percentile(self._values, [50, 99])
+        return wire.Quantiles(p50=float(p50), p99=float(p99))
+
+
+class Rates:
+    """Messages per second, from counts at past heartbeats."""
+
+    def __init__(self) -> None:
+        self._past: deque[tuple[float, dict[InputName, int]]] = deque()
+
+    def update(self, now_s: float, accepted: dict[InputName, int]) -> wire.InputRates:
+        """Rates [1/s] over the last two seconds."""
+        self._past.append((now_s, accepted))
+        while self._past[0][0] < now_s - _RATE_WINDOW_S and len(self._past) > 1:
+            self._past.popleft()
+        then_s, then = self._past[0]
+        if now_s <= then_s:
+            return wire.InputRates(joystick=None, actuators=None)
+
+        def rate(name: InputName) -> float:
+            return (accepted.get(name, 0) - then.get(name, 0)) / (now_s - then_s)
+
+        return wire.InputRates(joystick=rate("joystick"), actuators=rate("actuators"))
+
+
+@dataclass
+class Pulse:
+    """Makes heartbeats.
+
+    Attributes:
+        site: whose guard it is.
+        boot_id: of this run.
+        start_s: when the guard started, on the core's clock.
+    """
+
+    site: Site
+    boot_id: str
+    start_s: float
+    unix_s: Callable[[float], float]
+    scene_hash: str
+
+    def __post_init__(self) -> None:
+        self.loop_ms = Durations()
+        self.sweep_ms = Durations()
+        self.tick = 0
+        self._rates = Rates()
+        self._seq = 0
+
+    def beat(
+        self, health: Health, now_s: float, overruns: int, extra: Iterable[wire.Reason] = ()
+    ) -> wire.Heartbeat:
+        """A heartbeat; ``extra`` are reasons that only the daemon knows (no router, say)."""
+        self._seq += 1
+        keys = {"joystick": self.site.keys.joystick, "actuators": self.site.keys.actuators}
+        reasons = [
+            wire.Reason(code=r.code, text=r.text, key=keys[r.input] if r.input else None)
+            for r in health.reasons
+        ]
+        more = list(extra)
+        status = Status.DEGRADED if more and health.status is Status.OK else health.status
+        rejected: dict[str, dict[str, int]] = {}
+        for (name, reason), count in health.rejected.items():
+            rejected.setdefault(name, {})[reason] = count
+        return wire.Heartbeat(
+            boot_id=self.boot_id,
+            seq=self._seq,
+            site=self.site.name,
+            machine=self.site.machine,
+            status=status.value,
+            reasons=(*reasons, *more),
+            input_age_s=wire.InputAges(
+                joystick_s=health.ages_s["joystick"], actuators_s=health.ages_s["actuators"]
+            ),
+            rates_hz=self._rates.update(now_s, health.accepted),
+            accepted={str(k): v for k, v in health.accepted.items()},
+            rejected=rejected,
+            drops=overruns,
+            loop_ms=self.loop_ms.quantiles(),
+            sweep_ms=self.sweep_ms.quantiles(),
+            tick=self.tick,
+            scene_hash=self.scene_hash,
+            config_hash=self.site.content_hash,
+            version=__version__,
+            published_unix_s=self.unix_s(now_s),
+            uptime_s=now_s - self.start_s,
+        )

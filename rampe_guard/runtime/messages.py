@@ -1,0 +1,160 @@
+"""Core events and snapshots to messages of the contract.
+
+The core's clock has no epoch; `Scribe` is told how to turn its times into Unix times. An
+offline replay passes the log's own time through, so its output never depends on the day.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from rampe_guard import wire
+from rampe_guard.core.alarm import Level, State
+from rampe_guard.core.events import (
+    SYSTEM_ZONE,
+    AlertEvent,
+    PredictionEvent,
+    PredictionSummary,
+    SweepSummary,
+)
+from rampe_guard.core.guard import Snapshot
+from rampe_guard.core.types import FloatArray
+from rampe_guard.settings import Site
+
+
+@dataclass(frozen=True, slots=True)
+class Scribe:
+    """Writes the messages of one guard.
+
+    Attributes:
+        site: whose guard it is.
+        boot_id: of this run.
+        unix_s: Unix time [s] of a time on the core's clock.
+    """
+
+    site: Site
+    boot_id: str
+    unix_s: Callable[[float], float]
+
+    def alert(self, event: AlertEvent, compute_ms: float | None = None) -> wire.Alert:
+        """An alert event as ``rampe.alert.v1``."""
+        found, sweep, told = event.evidence, event.evidence.sweep, event.prediction
+        clear = event.level is Level.CLEAR
+        zone = None if event.zone == SYSTEM_ZONE else event.zone
+        link = sweep.link if sweep is not None else None
+        return wire.Alert(
+            alert_id=event.alert_id,
+            boot_id=self.boot_id,
+            seq=event.seq,
+            site=self.site.name,
+            machine=self.site.machine,
+            source=found.source,
+            inhibit="none",
+            quality=event.quality,
+            zone=zone,
+            link=link,
+            probability=None if clear else found.probability,
+            time_to_collision_s=None if clear else found.time_to_collision_s,
+            clearance_m=None if sweep is None else sweep.clearance_m,
+            clearance_now_m=None if sweep is None else sweep.clearance_now_m,
+            contact_point_m=None if sweep is None else sweep.contact_point_m,
+            contact_fraction=None if sweep is None else sweep.contact_fraction,
+            any_path=None,
+            **_words(event),
+            observations=None if told is None else told.occurrences,
+            predicted_displacement=self._by_name(None if told is None else told.mean),
+            predicted_endpoint=self._by_name(None if told is None else told.endpoint),
+            stamp=event.stamp_s,
+            published_unix_s=self.unix_s(event.now_s),
+            input_age_s=event.input_age_s,
+            compute_ms=compute_ms,
+            raised_unix_s=self.unix_s(event.raised_s),
+            changed_unix_s=self.unix_s(event.changed_s),
+            acked_by=event.acked_by,
+            expires_after_s=self.site.guard.alerts.expires_after_s,
+            text=wire.alert_text(
+                link,
+                zone if zone is not None else found.note,
+                found.time_to_collision_s,
+                event.level.word,
+                found.source,
+            ),
+        )
+
+    def prediction(self, event: PredictionEvent) -> wire.Prediction:
+        """A prediction event as ``rampe.prediction.v1``."""
+        ended = event.event == "ended"
+        return wire.Prediction(
+            boot_id=self.boot_id,
+            seq=event.seq,
+            site=self.site.name,
+            machine=self.site.machine,
+            event=event.event,
+            **self._told(event.prediction),
+            displacement=self._by_name(event.prediction.progress) if ended else None,
+            learned=event.learned if ended else None,
+            any_path=None,
+            sweeps=tuple(_sweep(s) for s in event.sweeps),
+            stamp=event.stamp_s,
+            published_unix_s=self.unix_s(event.now_s),
+        )
+
+    def state(
+        self,
+        heartbeat: wire.Heartbeat,
+        snapshot: Snapshot,
+        prediction: wire.Prediction | None,
+    ) -> wire.State:
+        """Everything at once as ``rampe.state.v1``."""
+        return wire.State(
+            heartbeat=heartbeat,
+            alerts=tuple(self.alert(e) for e in snapshot.alerts),
+            predictions=() if prediction is None else (prediction,),
+            position=self._by_name(snapshot.position),
+        )
+
+    def _told(self, told: PredictionSummary) -> dict[str, Any]:
+        return {
+            "category": told.category,
+            "observations": told.occurrences,
+            "mean": self._by_name(told.mean),
+            "scale": self._by_name(told.scale),
+            "dof": self._by_name(told.dof),
+            "start": self._by_name(told.start),
+            "endpoint": self._by_name(told.endpoint),
+            "progress": self._by_name(told.progress),
+        }
+
+    def _by_name(self, values: FloatArray | None) -> dict[str, float] | None:
+        if values is None:
+            return None
+        return dict(zip(self.site.actuator_names, values.tolist(), strict=True))
+
+
+def _words(event: AlertEvent) -> dict[str, Any]:
+    """The fields whose wire types are sets of words."""
+    told = event.prediction
+    return {
+        "level": event.level.word,
+        "previous_level": event.previous_level.word,
+        "state": "normal" if event.state is State.PENDING else event.state.value,
+        "category": None if told is None else told.category,
+    }
+
+
+def _sweep(summary: SweepSummary) -> wire.PredictionSweep:
+    zone = summary.zone
+    return wire.PredictionSweep(
+        source=summary.source,
+        zone=zone.zone,
+        certificate=zone.certificate.value,
+        contact_fraction=zone.contact_fraction,
+        link=zone.link,
+        contact_point_m=zone.contact_point_m,
+        clearance_m=zone.clearance_m,
+        clearance_now_m=zone.clearance_now_m,
+        probability=summary.probability,
+        time_to_collision_s=summary.time_to_collision_s,
+    )

@@ -1,0 +1,155 @@
+"""The daemon's one worker: drain, step, publish, answer, and a heartbeat at 5 Hz.
+
+It wakes every few milliseconds. When something arrived (or nothing did for a while), it
+takes everything that waits through `Guard.step`, which sweeps once, from the newest state;
+so however fast inputs come, nothing queues up. The heartbeat comes from this loop and from
+nowhere else: if the loop is stuck, the heartbeat stops.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import time
+from collections.abc import Callable
+
+from rampe_guard import wire
+from rampe_guard.assembly import Machine
+from rampe_guard.core.events import AlertEvent, Event, PredictionEvent
+from rampe_guard.core.monitor import Status
+from rampe_guard.core.types import Inputs
+from rampe_guard.errors import MessageError
+from rampe_guard.runtime.health import Pulse
+from rampe_guard.runtime.intake import Intake
+from rampe_guard.runtime.messages import Scribe
+from rampe_guard.runtime.replay import IDLE_STEP_S
+from rampe_guard.runtime.say import Sayer
+from rampe_guard.runtime.zenoh_io import Bus, Request
+
+_WAKE_S = 0.002
+"""Sleep between looks at the inboxes: adds half of it to the latency, costs 1 % of a core."""
+_BEAT_S = 0.2
+
+
+def boot_id() -> str:
+    """A new id for this run of a guard."""
+    return f"{int(time.time()):x}-{os.urandom(3).hex()}"
+
+
+class Worker:
+    """Runs one guard on a Zenoh session until it is told to stop.
+
+    Args:
+        machine: site, geometry and sweeper, loaded.
+        bus: an open session.
+        say: log.
+    """
+
+    def __init__(self, machine: Machine, bus: Bus, say: Sayer) -> None:
+        site = machine.site
+        base = site.keys.base
+        self._bus, self._say = bus, say
+        boot = boot_id()
+        start_s = time.monotonic()
+        self._guard = machine.guard(start_s, boot)
+        self._scribe = Scribe(site, boot, _unix_s)
+        self._pulse = Pulse(site, boot, start_s, _unix_s, site.scene.content_hash)
+        self._sweeper = machine.sweeper
+        self._intake = Intake(bus, site, say)
+        self._alerts = bus.outbox(f"{base}/alert", "rampe.alert.v1", urgent=True)
+        self._predictions = bus.outbox(f"{base}/prediction", "rampe.prediction.v1")
+        self._beats = bus.outbox(f"{base}/heartbeat", "rampe.heartbeat.v1", urgent=True)
+        self._states = bus.desk(f"{base}/state")
+        self._acks = bus.desk(f"{base}/ack")
+        bus.declare_alive(f"{base}/alive")
+        self._prediction: wire.Prediction | None = None
+        self._status: Status | None = None
+        self._connected = True
+        self._heartbeat: wire.Heartbeat | None = None
+
+    def run(self, stopped: Callable[[], bool], wait: Callable[[float], object]) -> None:
+        """Work until ``stopped``; ``wait`` sleeps but returns early when stopping."""
+        gc.collect()
+        gc.freeze()  # meshes and models are for life: do not walk them at every collection
+        last_step_s = last_beat_s = float("-inf")
+        while not stopped():
+            now_s = time.monotonic()
+            inputs = self._intake.collect(now_s)
+            arrived = inputs.joystick or inputs.actuators or inputs.rejected
+            if arrived or now_s - last_step_s >= IDLE_STEP_S:
+                last_step_s = now_s
+                self._step(inputs, now_s)
+            if now_s - last_beat_s >= _BEAT_S:
+                last_beat_s = now_s
+                self._beat(now_s)
+            self._answer(now_s)
+            wait(_WAKE_S)
+
+    def _step(self, inputs: Inputs, now_s: float) -> None:
+        began = time.perf_counter()
+        events = self._guard.step(inputs, now_s)
+        compute_ms = (time.perf_counter() - began) * 1e3
+        for event in events:
+            self._publish(event, compute_ms)
+        if inputs.actuators:
+            self._pulse.sweep_ms.add(self._sweeper.spent_ms())
+            self._pulse.loop_ms.add((time.perf_counter() - began) * 1e3)
+
+    def _publish(self, event: Event, compute_ms: float | None) -> None:
+        if isinstance(event, AlertEvent):
+            message = self._scribe.alert(event, compute_ms)
+            self._alerts.put(wire.encode(message))
+            if event.kind == "transition":
+                self._say.info(f"{message.level}: {message.text}")
+        elif isinstance(event, PredictionEvent):
+            self._prediction = self._scribe.prediction(event)
+            self._predictions.put(wire.encode(self._prediction))
+
+    def _beat(self, now_s: float) -> None:
+        self._pulse.tick += 1
+        connected = self._bus.connected
+        extra = []
+        if not connected:
+            extra.append(wire.Reason(code="no_router", text="no Zenoh router", key=None))
+        health = self._guard.snapshot(now_s).health
+        self._heartbeat = self._pulse.beat(health, now_s, self._intake.overruns, extra)
+        self._beats.put(wire.encode(self._heartbeat))
+        if connected is not self._connected:
+            self._connected = connected
+            self._say.info("Zenoh router is back" if connected else "Zenoh router is gone")
+        if health.status is not self._status:
+            self._status = health.status
+            why = "; ".join(r.text for r in self._heartbeat.reasons)
+            self._say.info(f"status {health.status.value}{': ' + why if why else ''}")
+
+    def _answer(self, now_s: float) -> None:
+        for request in self._states.drain():
+            if self._heartbeat is None:
+                request.refuse("not ready yet")
+                continue
+            snapshot = self._guard.snapshot(now_s)
+            state = self._scribe.state(self._heartbeat, snapshot, self._prediction)
+            request.reply(wire.encode(state))
+        for request in self._acks.drain():
+            self._acknowledge(request, now_s)
+
+    def _acknowledge(self, request: Request, now_s: float) -> None:
+        try:
+            ack = wire.decode(request.payload or b"", wire.Ack, limit=wire.MAX_PAYLOAD_BYTES)
+        except MessageError as error:
+            request.refuse(str(error))
+            return
+        events = self._guard.acknowledge(ack.alert_id, ack.who, now_s)
+        if not events:
+            request.refuse(f"no alert {ack.alert_id!r} waits for an acknowledgement")
+            return
+        self._say.info(f"{ack.alert_id} acknowledged by {ack.who}")
+        for event in events:
+            self._publish(event, None)
+            if isinstance(event, AlertEvent):
+                request.reply(wire.encode(self._scribe.alert(event)))
+
+
+def _unix_s(now_s: float) -> float:
+    """Unix time of a monotonic time, by the wall clock as it is set now."""
+    return time.time() - time.monotonic() + now_s
