@@ -62,11 +62,11 @@ class Habits:
     """
 
     vigour: tuple[float, float] = (0.85, 1.0)
-    gentle: float = 0.3
-    slow_down_s: float = 0.35
+    gentle: float = 0.4
+    slow_down_s: float = 0.25
     foresight: tuple[float, float] = (0.8, 1.2)
     stagger_s: tuple[float, float] = (0.0, 0.15)
-    reaction_s: tuple[float, float] = (0.05, 0.25)
+    reaction_s: tuple[float, float] = (0.05, 0.2)
     notice_s: tuple[float, float] = (0.25, 0.5)
     lever_rate: float = 8.0
     lever_noise: float = 0.03

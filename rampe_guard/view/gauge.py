@@ -13,12 +13,12 @@ DIM = "grey50"
 ENDS = {1: "▷", -1: "◁"}
 
 
-def gauge(actuator: ActuatorView, width: int, *, stale: bool) -> Text:
+def gauge(actuator: ActuatorView, width: int, *, stale: bool, predicted: bool = True) -> Text:
     """Draw the travel between the limits in ``width`` cells.
 
     ``●`` is the position, ``▷`` or ``◁`` the predicted endpoint, ``━`` the way between them.
     An endless actuator is drawn over one turn about zero. A position beyond a limit is
-    drawn at the edge as ``«`` or ``»``.
+    drawn at the edge as ``«`` or ``»``. ``predicted`` False leaves the forecast out.
     """
     if actuator.position is None:
         return Text("no position".center(width)[:width], "yellow")
@@ -29,7 +29,7 @@ def gauge(actuator: ActuatorView, width: int, *, stale: bool) -> Text:
     cells = [TRACK] * width
     styles = [DIM] * width
     here = _cell(position, lower, upper, width)
-    if actuator.endpoint is not None and actuator.sign:
+    if predicted and actuator.endpoint is not None and actuator.sign:
         there = _cell(position + actuator.endpoint - actuator.position, lower, upper, width)
         for i in range(min(here, there), max(here, there) + 1):
             cells[i], styles[i] = SPAN, "cyan"

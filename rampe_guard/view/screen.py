@@ -7,6 +7,7 @@ a fresh heartbeat the screen says that nobody is protected, never that nothing i
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 from rich.console import Group, RenderableType
@@ -34,7 +35,8 @@ GREY = "grey62"
 ALARM = "bold #ffffff on #b00000"
 ARROWS = {1: "→", 0: "·", -1: "←", None: "?"}
 WIDE = 110
-_FIXED_ROWS = 8
+_FIXED_ROWS = 6
+_ALERT_ROWS = 3
 
 
 def render(state: ViewState, width: int = 80, height: int = 24) -> RenderableType:
@@ -46,13 +48,15 @@ def render(state: ViewState, width: int = 80, height: int = 24) -> RenderableTyp
         height: of the terminal [cells]; old events give way first, alerts never.
     """
     head = [_header(state, width), *_banner(state, width)]
-    rows = len(head) + len(state.actuators) + max(1, len(state.alerts)) + _FIXED_ROWS
+    spare = max(0, _ALERT_ROWS - max(1, len(state.alerts)))  # so that an alert moves nothing
+    rows = len(head) + len(state.actuators) + max(1, len(state.alerts)) + spare + _FIXED_ROWS
     return Group(
         *head,
         _title("actuators", _basis(state), width),
         _actuators(state, width),
         _title("alerts", "", width),
         _alerts(state, width),
+        *[Text("")] * spare,
         _title("events", "", width),
         _events(state, max(1, height - rows)),
         Text(""),
@@ -110,6 +114,7 @@ def _basis(state: ViewState) -> str:
 def _actuators(state: ViewState, width: int) -> Table:
     table = Table(box=None, padding=(0, 1, 0, 0), header_style=GREY, width=width)
     stale = state.position_stale
+    lost = state.protection in {Protection.NOT_MONITORING, Protection.UNAVAILABLE}
     bar = 20 if width < WIDE else width - 74
     table.add_column("", no_wrap=True, max_width=10)
     table.add_column("travel", width=bar, no_wrap=True)
@@ -124,12 +129,12 @@ def _actuators(state: ViewState, width: int) -> Table:
         places = digits(actuator)
         cells = [
             Text(actuator.name, "" if not stale else DIM),
-            gauge(actuator, bar, stale=stale),
+            gauge(actuator, bar, stale=stale, predicted=not lost),
             _number(actuator.position, places, f" {actuator.unit}", stale=stale),
             _number(actuator.velocity, places, "", stale=stale, signed=True),
-            _lever(actuator, stale=stale),
-            Text(ARROWS[actuator.sign], "bold" if actuator.sign else GREY),
-            _prediction(actuator, places),
+            _lever(actuator, stale=state.command_stale),
+            Text(ARROWS[actuator.sign], "bold" if actuator.sign and not lost else GREY),
+            _prediction(actuator, places, stale=lost),
         ]
         if width >= WIDE:
             moving = actuator.endpoint if actuator.sign else None
@@ -171,12 +176,18 @@ def _alert_cells(state: ViewState, alert: AlertView, width: int) -> Iterable[Tex
     chance = alert.probability
     yield level
     yield Text(where, plain or "bold")
-    yield Text("" if seconds is None else f"in {max(0.0, seconds):.1f} s", plain)
+    yield Text("" if seconds is None else _countdown(seconds), plain)
     yield Text("" if chance is None else f"{chance:4.0%}", plain)
     yield Text(_remark(state, alert, stale=stale), plain or GREY)
     if width >= WIDE:
         clear = alert.clearance_now_m
         yield Text("" if clear is None else f"now {clear:+.2f} m from the margin", plain or GREY)
+
+
+def _countdown(seconds: float) -> str:
+    """Rounded down: no more time is promised than there is."""
+    tenths = max(0, math.floor(seconds * 10.0 + 1e-6))
+    return f"in {tenths / 10.0:.1f} s" if tenths else "now"
 
 
 def _remark(state: ViewState, alert: AlertView, *, stale: bool) -> str:
@@ -185,7 +196,9 @@ def _remark(state: ViewState, alert: AlertView, *, stale: bool) -> str:
     words = [alert.source]
     if not alert.trusted:
         words.append("DOUBTFUL")
-    if not alert.attention:
+    if alert.gone:
+        words = ["over; please acknowledge"]
+    elif not alert.attention:
         words.append("seen")
     return " · ".join(words)
 
@@ -212,8 +225,9 @@ def _footer(state: ViewState, width: int) -> Text:
     health = state.health
     if health is None:
         return Text(" no heartbeat yet", GREY)
+    known = "last known: " if state.protection is Protection.UNAVAILABLE else ""
     line = Text(
-        f" loop {_pair(health.loop_p50_ms, health.loop_p99_ms)}"
+        f" {known}loop {_pair(health.loop_p50_ms, health.loop_p99_ms)}"
         f" · sweep {_pair(health.sweep_p50_ms, health.sweep_p99_ms)} ms p50/p99"
         f" · age: joystick {_ms(health.joystick_age_s)}, actuators {_ms(health.actuators_age_s)}",
         GREY,
@@ -235,20 +249,21 @@ def _number(
     if value is None:
         return Text("—", GREY)
     sign = "+" if signed else ""
+    value = round(value, places) + 0.0  # no "-0.00"
     return Text(f"{value:{sign}.{places}f}{unit}", DIM if stale else "")
 
 
 def _lever(actuator: ActuatorView, *, stale: bool) -> Text:
     if actuator.command is None:
         return Text("—", GREY)
-    return Text(f"{actuator.command:+.0%}", DIM if stale else "")
+    return Text(f"{round(actuator.command, 2) + 0.0:+.0%}", DIM if stale else "")
 
 
-def _prediction(actuator: ActuatorView, places: int) -> Text:
+def _prediction(actuator: ActuatorView, places: int, *, stale: bool) -> Text:
     if actuator.displacement is None or not actuator.sign:
         return Text("—", GREY)
     spread = "" if actuator.spread is None else f" ± {actuator.spread:.{places}f}"
-    return Text(f"{actuator.displacement:+.{places}f}{spread}", "cyan")
+    return Text(f"{actuator.displacement:+.{places}f}{spread}", DIM if stale else "cyan")
 
 
 def _fit(text: str, width: int) -> str:

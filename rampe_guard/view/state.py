@@ -33,6 +33,8 @@ class ActuatorView:
         displacement: predicted for this primitive, x̂ [unit].
         spread: of the prediction [unit].
         endpoint: predicted [unit].
+        axis: index of its joystick axis.
+        axis_sign: +1 if a positive axis moves it up, else -1.
     """
 
     name: str
@@ -46,6 +48,8 @@ class ActuatorView:
     displacement: float | None = None
     spread: float | None = None
     endpoint: float | None = None
+    axis: int = 0
+    axis_sign: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,35 +60,37 @@ class AlertView:
         alert_id: names the alert; the zone names its line.
         zone: keep-out object.
         level: how urgent.
+        boot_id: of the guard that raised it.
         source: stopping, intent, next, contact or system.
         link: of the arm, or None.
         time_to_collision_s: [s].
         probability: of contact [-].
         clearance_now_m: to the margin [m].
         attention: nobody has acknowledged it.
+        gone: its cause is gone; it only waits to be acknowledged.
         trusted: the guard says that its quality is good.
         text: the guard's own words.
         received_s: when the message came [s].
         expires_after_s: age at which it must not be trusted [s].
-        stamped_unix_s: when it was published, on the clock of the guard [s].
-        warned_unix_s: when it first warned, on the same clock; None below warning.
+        warned_unix_s: when it first warned, on the guard's clock [s]; None below warning.
         came_true: the arm went in.
     """
 
     alert_id: str
     zone: str
     level: Level
-    source: str
+    boot_id: str = ""
+    source: str = "intent"
     link: str | None = None
     time_to_collision_s: float | None = None
     probability: float | None = None
     clearance_now_m: float | None = None
     attention: bool = True
+    gone: bool = False
     trusted: bool = True
     text: str = ""
     received_s: float = 0.0
     expires_after_s: float = 1.0
-    stamped_unix_s: float = 0.0
     warned_unix_s: float | None = None
     came_true: bool = False
 
@@ -140,6 +146,7 @@ class ViewState:
         actuators: in site order.
         observations: primitives behind the prediction, or None without one.
         position_received_s: when positions last came [s]; None = never.
+        command_received_s: when lever positions last came [s]; None = never.
         prediction_received_s: when a prediction last came [s]; None = none in force.
         health: last heartbeat; None = never one.
         alerts: active ones, at most one per zone.
@@ -153,6 +160,7 @@ class ViewState:
     actuators: tuple[ActuatorView, ...]
     observations: int | None = None
     position_received_s: float | None = None
+    command_received_s: float | None = None
     prediction_received_s: float | None = None
     health: HealthView | None = None
     alerts: tuple[AlertView, ...] = ()
@@ -174,9 +182,16 @@ class ViewState:
     @property
     def position_stale(self) -> bool:
         """Positions are missing or too old to be shown as present."""
-        came_s = self.position_received_s
-        return came_s is None or self.now_s - came_s > self.expires_after_s
+        return self._too_old(self.position_received_s)
+
+    @property
+    def command_stale(self) -> bool:
+        """The same of lever positions."""
+        return self._too_old(self.command_received_s)
 
     def alert_stale(self, alert: AlertView) -> bool:
         """An alert that was not repeated in time: still shown, no longer current."""
         return self.now_s - alert.received_s > alert.expires_after_s
+
+    def _too_old(self, received_s: float | None) -> bool:
+        return received_s is None or self.now_s - received_s > self.expires_after_s

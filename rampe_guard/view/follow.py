@@ -1,0 +1,214 @@
+"""Messages → `ViewState`: one pure function for each message of the contract.
+
+Times ``now_s`` are on the viewer's clock. Lead times are differences of the guard's own
+publication times, so the way to the viewer does not blur them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from rampe_guard.core.alarm import Level
+from rampe_guard.core.config import ActuatorConfig
+from rampe_guard.view.state import (
+    ActuatorView,
+    AlertView,
+    EventView,
+    HealthView,
+    Protection,
+    ViewState,
+)
+from rampe_guard.wire import (
+    ActuatorsMessage,
+    Alert,
+    Heartbeat,
+    JoystickMessage,
+    Prediction,
+    State,
+)
+
+_KEEP_EVENTS = 50
+_PROTECTION = {
+    "ok": Protection.MONITORING,
+    "degraded": Protection.DEGRADED,
+    "not_monitoring": Protection.NOT_MONITORING,
+}
+
+
+def begin(
+    machine: str,
+    site: str,
+    actuators: Sequence[ActuatorConfig],
+    limits: Sequence[tuple[float | None, float | None]],
+    now_s: float,
+) -> ViewState:
+    """Return the screen before the first message: protection unavailable.
+
+    Args:
+        machine: its name.
+        site: its name.
+        actuators: n actuators.
+        limits: n pairs (lower, upper) [unit]; None or infinite = endless.
+        now_s: now [s].
+    """
+    return ViewState(
+        machine,
+        site,
+        now_s,
+        tuple(
+            ActuatorView(a.name, a.unit, _finite(low), _finite(high), axis=a.axis, axis_sign=a.sign)
+            for a, (low, high) in zip(actuators, limits, strict=True)
+        ),
+    )
+
+
+def at(state: ViewState, now_s: float) -> ViewState:
+    """Let time pass."""
+    return replace(state, now_s=now_s)
+
+
+def add_event(state: ViewState, level: Level, text: str) -> ViewState:
+    """Put a line on top of the events."""
+    events = (EventView(state.now_s, level, text), *state.events)
+    return replace(state, events=events[:_KEEP_EVENTS])
+
+
+def on_joystick(state: ViewState, message: JoystickMessage, now_s: float) -> ViewState:
+    """Show the levers."""
+    actuators = tuple(
+        replace(a, command=a.axis_sign * message.axes[a.axis]) for a in state.actuators
+    )
+    return replace(state, now_s=now_s, command_received_s=now_s, actuators=actuators)
+
+
+def on_actuators(state: ViewState, message: ActuatorsMessage, now_s: float) -> ViewState:
+    """Show where the machine is; arrays in site order, as `wire.decode_actuators` gives them."""
+    speeds = message.velocity or (None,) * len(state.actuators)
+    actuators = tuple(
+        replace(a, position=position, velocity=velocity)
+        for a, position, velocity in zip(state.actuators, message.position, speeds, strict=True)
+    )
+    return replace(state, now_s=now_s, position_received_s=now_s, actuators=actuators)
+
+
+def on_prediction(state: ViewState, message: Prediction, now_s: float) -> ViewState:
+    """Show the primitive under way; one that ended leaves no prediction behind."""
+    ended = message.event == "ended"
+    actuators = tuple(
+        replace(
+            a,
+            sign=0 if ended else sign,
+            displacement=None if ended else _of(message.mean, a.name),
+            spread=None if ended else _of(message.scale, a.name),
+            endpoint=None if ended else _of(message.endpoint, a.name),
+        )
+        for a, sign in zip(state.actuators, message.category, strict=True)
+    )
+    return replace(
+        state,
+        now_s=now_s,
+        actuators=actuators,
+        observations=message.observations,
+        prediction_received_s=None if ended or message.mean is None else now_s,
+    )
+
+
+def on_heartbeat(state: ViewState, message: Heartbeat, now_s: float) -> ViewState:
+    """Show health; a guard that restarted takes its old alerts with it."""
+    before = state.health
+    health = HealthView(
+        protection=_PROTECTION[message.status],
+        reasons=tuple(reason.text for reason in message.reasons),
+        boot_id=message.boot_id,
+        received_s=now_s,
+        joystick_age_s=message.input_age_s.joystick_s,
+        actuators_age_s=message.input_age_s.actuators_s,
+        loop_p50_ms=message.loop_ms.p50 if message.loop_ms else None,
+        loop_p99_ms=message.loop_ms.p99 if message.loop_ms else None,
+        sweep_p50_ms=message.sweep_ms.p50 if message.sweep_ms else None,
+        sweep_p99_ms=message.sweep_ms.p99 if message.sweep_ms else None,
+        version=message.version,
+    )
+    state = replace(state, now_s=now_s, health=health)
+    if before is not None and before.boot_id != health.boot_id:
+        kept = tuple(a for a in state.alerts if a.boot_id == health.boot_id)
+        state = add_event(replace(state, alerts=kept), Level.WARNING, "the guard restarted")
+    if before is None or before.protection is health.protection:
+        return state
+    if health.protection is Protection.MONITORING:
+        return add_event(state, Level.CLEAR, "monitoring again")
+    level = Level.CAUTION if health.protection is Protection.DEGRADED else Level.IMMINENT
+    text = f"{health.protection.value.upper()}: {'; '.join(health.reasons)}"
+    return add_event(state, level, text)
+
+
+def on_alert(state: ViewState, message: Alert, now_s: float) -> ViewState:
+    """Show an alert, and tell of it when it rises, comes true or ends."""
+    state = replace(state, now_s=now_s)
+    zone = message.zone or "system"
+    before = next((a for a in state.alerts if a.zone == zone), None)
+    others = tuple(a for a in state.alerts if a.zone != zone)
+    if message.state == "normal":
+        state = replace(state, alerts=others)
+        return state if before is None else add_event(state, Level.CLEAR, f"{zone}: clear")
+    alert = _alert(message, zone, before, now_s)
+    state = replace(state, alerts=(*others, alert))
+    if alert.came_true and not (before and before.came_true):
+        return add_event(state, Level.IMMINENT, _came_true(alert, message.published_unix_s))
+    if before is None or alert.level > before.level:
+        return add_event(state, alert.level, f"{zone}: {message.text}")
+    return state
+
+
+def on_state(state: ViewState, message: State, now_s: float) -> ViewState:
+    """Catch up, for a viewer that comes late."""
+    state = on_heartbeat(state, message.heartbeat, now_s)
+    for alert in message.alerts:
+        state = on_alert(state, alert, now_s)
+    for prediction in message.predictions:
+        state = on_prediction(state, prediction, now_s)
+    return state
+
+
+def _alert(message: Alert, zone: str, before: AlertView | None, now_s: float) -> AlertView:
+    level = Level[message.level.upper()]
+    came_true = message.source == "contact" or (before is not None and before.came_true)
+    warned_s = before.warned_unix_s if before is not None else None
+    if level < Level.WARNING:
+        warned_s = None
+    elif warned_s is None and message.source != "contact":
+        warned_s = message.published_unix_s
+    return AlertView(
+        alert_id=message.alert_id,
+        zone=zone,
+        level=level,
+        boot_id=message.boot_id,
+        source=message.source,
+        link=message.link,
+        time_to_collision_s=message.time_to_collision_s,
+        probability=message.probability,
+        clearance_now_m=message.clearance_now_m,
+        attention=message.state != "acked",
+        gone=message.state == "rtn_unacked",
+        trusted=message.quality == "good",
+        text=message.text,
+        received_s=now_s,
+        expires_after_s=message.expires_after_s,
+        warned_unix_s=warned_s,
+        came_true=came_true,
+    )
+
+
+def _came_true(alert: AlertView, published_unix_s: float) -> str:
+    if alert.warned_unix_s is None:
+        return f"{alert.zone}: entered WITHOUT A WARNING"
+    return f"{alert.zone}: entered; warned {published_unix_s - alert.warned_unix_s:.2f} s ahead"
+
+
+def _of(values: Mapping[str, float] | None, name: str) -> float | None:
+    return None if values is None else values.get(name)
+
+
+def _finite(limit: float | None) -> float | None:
+    return None if limit is None or abs(limit) == float("inf") else limit
