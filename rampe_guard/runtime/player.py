@@ -1,0 +1,63 @@
+"""Puts inputs on a machine's keys as the machine itself would: simulated or from a log."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from rampe_guard import wire
+from rampe_guard.core.types import FloatArray
+from rampe_guard.runtime.stopping import StopFlag
+from rampe_guard.runtime.zenoh_io import Bus
+from rampe_guard.settings import Site
+
+_PATIENCE_S = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """Both inputs of one moment; ``at_s`` is when to send them, from the start of play [s]."""
+
+    at_s: float
+    stamp_s: float | None
+    axes: FloatArray
+    position: FloatArray
+    velocity: FloatArray | None
+
+
+class Player:
+    """Publishes frames in real time, the joystick before the actuators that it moved."""
+
+    def __init__(self, bus: Bus, site: Site) -> None:
+        self._joystick = bus.outbox(site.keys.joystick)
+        self._actuators = bus.outbox(site.keys.actuators)
+
+    def wait_for_listener(self, stop: StopFlag) -> bool:
+        """Wait until somebody subscribes, at most ten seconds; whether somebody did."""
+        until = time.monotonic() + _PATIENCE_S
+        while time.monotonic() < until and not stop.wait(0.02):
+            if self._joystick.heard and self._actuators.heard:
+                return True
+        return False
+
+    def play(self, frames: Iterable[Frame], stop: StopFlag, speed: float = 1.0) -> int:
+        """Send every frame at its time, ``speed`` times as fast; returns how many were sent."""
+        start_s = time.monotonic()
+        sent = 0
+        for frame in frames:
+            wait_s = start_s + frame.at_s / speed - time.monotonic()
+            if stop.wait(wait_s) if wait_s > 0.0 else stop():
+                break
+            self._send(frame)
+            sent += 1
+        return sent
+
+    def _send(self, frame: Frame) -> None:
+        stamp = time.time() if frame.stamp_s is None else frame.stamp_s
+        axes = tuple(frame.axes.tolist())
+        self._joystick.put(wire.encode(wire.JoystickMessage(axes=axes, stamp=stamp)))
+        velocity = None if frame.velocity is None else tuple(frame.velocity.tolist())
+        position = tuple(frame.position.tolist())
+        message = wire.ActuatorsMessage(position=position, velocity=velocity, stamp=stamp)
+        self._actuators.put(wire.encode(message))
