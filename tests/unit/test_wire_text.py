@@ -1,0 +1,41 @@
+"""The line on the cab display."""
+
+from __future__ import annotations
+
+import pytest
+
+from rampe_guard.wire import MAX_TEXT, alert_text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("bucket", "cab-wall", 1.42), "bucket → cab-wall in 1.4 s"),
+        (("bucket", "cab-wall", 2.3), "bucket → cab-wall in 2.3 s"),
+        (("bucket", "cab-wall", 1.99), "bucket → cab-wall in 1.9 s"),
+        (("bucket", "cab-wall", 0.09), "bucket → cab-wall now"),
+        (("bucket", "cab-wall", 100.0), "bucket → cab-wall in >99 s"),
+        (("bucket", "cab-wall", None), "bucket → cab-wall, time unknown"),
+        (("bucket", "cab-wall", float("inf")), "bucket → cab-wall, time unknown"),
+        ((None, "road-side", 1.0), "arm → road-side in 1.0 s"),
+        (("bucket", "cab-wall", 0.0, "imminent", "contact"), "bucket at cab-wall"),
+        (("bucket", "cab-wall", None, "clear"), "cab-wall clear"),
+        ((None, "joystick silent", None, "warning", "system"), "NOT MONITORING: joystick silent"),
+        ((None, "joystick silent", None, "clear", "system"), "monitoring again"),
+        (("a\nb", "c", 1.0), "a?b → c in 1.0 s"),
+    ],
+)
+def test_text(arguments: tuple[str | None, str | None, float | None], text: str) -> None:
+    assert alert_text(*arguments) == text
+
+
+def test_long_names_are_cut_and_the_time_stays() -> None:
+    text = alert_text("l" * 64, "z" * 64, 1.4)
+    assert len(text) == MAX_TEXT
+    assert text.endswith("z… in 1.4 s")
+    assert "l… → z" in text
+
+
+def test_a_short_name_leaves_its_room_to_the_other() -> None:
+    assert alert_text("boom", "z" * 40, 1.4) == "boom → " + "z" * 40 + " in 1.4 s"
+    assert alert_text("l" * 40, "pole", 1.4) == "l" * 40 + " → pole in 1.4 s"
