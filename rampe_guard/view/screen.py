@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+from rich.cells import cell_len, set_cell_size
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
@@ -78,7 +79,7 @@ def _header(state: ViewState, width: int) -> Text:
     }
     word, style = words[state.protection]
     name = f"{state.machine} · {state.site}"
-    line = Text(name[: width - len(word) - 4], "bold")
+    line = Text(_fit(name, width - len(word) - 4), "bold")
     line.append(" " * max(1, width - line.cell_len - len(word) - 2))
     return line.append(f" {word} ", style)
 
@@ -101,7 +102,10 @@ def _banner(state: ViewState, width: int) -> list[Text]:
             else f"no message from the guard for {silent:.1f} s",
         ]
     lines.append("Collision warnings will not come. Work as if there were none.")
-    return [Text(_fit(line, width).center(width), ALARM) for line in lines]
+    rows = [Text(_fit(line, width), ALARM) for line in lines]
+    for row in rows:
+        row.align("center", width)
+    return rows
 
 
 def _basis(state: ViewState) -> str:
@@ -115,19 +119,17 @@ def _actuators(state: ViewState, width: int) -> Table:
     table = Table(box=None, padding=(0, 1, 0, 0), header_style=GREY, width=width)
     stale = state.position_stale
     lost = state.protection in {Protection.NOT_MONITORING, Protection.UNAVAILABLE}
-    bar = 20 if width < WIDE else width - 74
-    table.add_column("", no_wrap=True, max_width=10)
+    bar = 20 if width < WIDE else width - 72
+    table.add_column("", no_wrap=True, width=9, overflow="ellipsis")
     table.add_column("travel", width=bar, no_wrap=True)
-    table.add_column("position", justify="right", no_wrap=True)
-    table.add_column("speed/s", justify="right", no_wrap=True)
-    table.add_column("lever", justify="right", no_wrap=True)
-    table.add_column("", no_wrap=True)
-    table.add_column("x̂ ± spread", justify="right", no_wrap=True)
+    numbers = [("position", 10), ("speed/s", 8), ("lever", 6), ("", 1), ("x̂ ± spread", 15)]
     if width >= WIDE:
-        table.add_column("endpoint", justify="right", no_wrap=True)
+        numbers.append(("endpoint", 10))
+    for title, cells in numbers:  # fixed, so that no column moves when a number changes
+        table.add_column(title, justify="right", no_wrap=True, width=cells)
     for actuator in state.actuators:
         places = digits(actuator)
-        cells = [
+        row = [
             Text(actuator.name, "" if not stale else DIM),
             gauge(actuator, bar, stale=stale, predicted=not lost),
             _number(actuator.position, places, f" {actuator.unit}", stale=stale),
@@ -138,8 +140,8 @@ def _actuators(state: ViewState, width: int) -> Table:
         ]
         if width >= WIDE:
             moving = actuator.endpoint if actuator.sign else None
-            cells.append(_number(moving, places, f" {actuator.unit}", stale=stale))
-        table.add_row(*cells)
+            row.append(_number(moving, places, f" {actuator.unit}", stale=stale))
+        table.add_row(*row)
     if stale:
         table.columns[1].header = Text("travel: STALE", "yellow")
     return table
@@ -267,7 +269,7 @@ def _prediction(actuator: ActuatorView, places: int, *, stale: bool) -> Text:
 
 
 def _fit(text: str, width: int) -> str:
-    return text if len(text) <= width else f"{text[: width - 1]}…"
+    return text if cell_len(text) <= width else f"{set_cell_size(text, width - 1)}…"
 
 
 def _age(seconds: float) -> str:

@@ -101,17 +101,16 @@ def _verdict(zone: ZoneTally) -> Text:
 def _run(tally: Tally, everything: ZoneTally) -> str:
     minutes = tally.duration_s / 60.0
     watched = minutes * len(tally.zones)
-    parts = [f"{minutes:.1f} min"]
-    if tally.cycles is not None:
-        parts.insert(0, f"{tally.cycles} cycles in")
-        parts[:2] = [" ".join(parts[:2])]
+    work = "" if tally.cycles is None else f"{tally.cycles} cycles in "
+    first = f"{work}{minutes:.1f} min"
     if watched > 0.0:
-        parts.append(f"{everything.false_alarms / watched:.2f} false alarms per minute and zone")
+        first += f" · {everything.false_alarms / watched:.2f} false alarms per minute and zone"
+    lines = [first]
     if everything.unknown_contacts:
-        parts.append(f"{everything.unknown_contacts} contacts from sweeps without an answer")
+        lines.append(f"{everything.unknown_contacts} contacts rest on sweeps without an answer")
     if tally.loop_p50_ms is not None and tally.loop_p99_ms is not None:
-        parts.append(f"loop {tally.loop_p50_ms:.1f} ms p50, {tally.loop_p99_ms:.1f} ms p99")
-    return " · ".join(parts)
+        lines.append(f"loop {tally.loop_p50_ms:.1f} ms p50, {tally.loop_p99_ms:.1f} ms p99")
+    return "\n".join(lines)
 
 
 def _seconds(value: float | None) -> Text:

@@ -1,0 +1,257 @@
+"""Messages of the contract become a screen: real structs, encoded and decoded."""
+
+from __future__ import annotations
+
+import pytest
+from msgspec import structs
+
+from rampe_guard.core.alarm import Level
+from rampe_guard.core.config import ActuatorConfig
+from rampe_guard.view import follow
+from rampe_guard.view.state import Protection, ViewState
+from rampe_guard.wire import (
+    ActuatorsMessage,
+    Alert,
+    Heartbeat,
+    InputAges,
+    InputRates,
+    JoystickMessage,
+    Prediction,
+    Quantiles,
+    Reason,
+    State,
+    decode,
+    encode,
+)
+
+ACTUATORS = (
+    ActuatorConfig("swing", 1, 1, 0.8, 1.2, 0.12, 0.08, "rad"),
+    ActuatorConfig("boom", 0, -1, 0.3, 1.0, 0.16, 0.08, "m"),
+)
+HEARTBEAT = Heartbeat(
+    boot_id="boot-1",
+    seq=1,
+    site="quarry-north",
+    machine="excavator-7",
+    status="ok",
+    reasons=(),
+    input_age_s=InputAges(joystick_s=0.01, actuators_s=None),
+    rates_hz=InputRates(joystick=50.0, actuators=None),
+    accepted={},
+    rejected={},
+    drops=None,
+    loop_ms=Quantiles(p50=1.1, p99=4.2),
+    sweep_ms=None,
+    tick=7,
+    scene_hash="",
+    config_hash="",
+    version="0.1.0",
+    published_unix_s=1e9,
+    uptime_s=1.0,
+)
+ALERT = Alert(
+    alert_id="boot-1-wall-1",
+    boot_id="boot-1",
+    seq=1,
+    site="quarry-north",
+    machine="excavator-7",
+    source="intent",
+    level="warning",
+    previous_level="clear",
+    state="unacked",
+    inhibit="none",
+    quality="good",
+    zone="wall",
+    link="bucket",
+    probability=0.83,
+    time_to_collision_s=1.4,
+    clearance_m=0.0,
+    clearance_now_m=0.9,
+    contact_point_m=None,
+    contact_fraction=0.6,
+    any_path=None,
+    category=(1, 0),
+    observations=12,
+    predicted_displacement=None,
+    predicted_endpoint=None,
+    stamp=12.0,
+    published_unix_s=1e9,
+    input_age_s=0.01,
+    compute_ms=1.0,
+    raised_unix_s=1e9,
+    changed_unix_s=1e9,
+    acked_by=None,
+    expires_after_s=1.0,
+    text="bucket → wall in 1.4 s",
+)
+PREDICTION = Prediction(
+    boot_id="boot-1",
+    seq=1,
+    site="quarry-north",
+    machine="excavator-7",
+    event="started",
+    category=(1, -1),
+    observations=12,
+    mean={"swing": 0.7, "boom": -0.1},
+    scale={"swing": 0.1, "boom": 0.02},
+    dof={"swing": 9.0, "boom": 9.0},
+    start={"swing": 0.1, "boom": 0.8},
+    endpoint={"swing": 0.8, "boom": 0.7},
+    progress={"swing": 0.0, "boom": 0.0},
+    displacement=None,
+    learned=None,
+    any_path=None,
+    sweeps=(),
+    stamp=12.0,
+    published_unix_s=1e9,
+)
+
+
+def fresh() -> ViewState:
+    limits = [(None, float("inf")), (0.0, 1.2)]
+    return follow.begin("excavator-7", "quarry-north", ACTUATORS, limits, 10.0)
+
+
+def sent(alert: Alert) -> Alert:
+    return decode(encode(alert), Alert)
+
+
+def alerts(*changes: dict[str, object]) -> ViewState:
+    state = follow.on_heartbeat(fresh(), HEARTBEAT, 10.0)
+    for i, change in enumerate(changes):
+        message = sent(structs.replace(ALERT, **change))
+        state = follow.on_alert(state, message, 10.0 + 0.1 * i)
+    return state
+
+
+def texts(state: ViewState) -> list[str]:
+    return [event.text for event in state.events]
+
+
+def test_before_the_first_message_nobody_is_protected() -> None:
+    state = fresh()
+    assert state.protection is Protection.UNAVAILABLE
+    assert state.position_stale
+    assert (state.actuators[0].lower, state.actuators[0].upper) == (None, None)
+    assert state.actuators[1].upper == 1.2
+
+
+def test_levers_are_shown_in_the_direction_of_the_actuator() -> None:
+    state = follow.on_joystick(fresh(), JoystickMessage(axes=(0.5, -0.25)), 10.2)
+    assert [a.command for a in state.actuators] == [-0.25, -0.5]
+    assert not state.command_stale
+    assert follow.at(state, 11.3).command_stale
+
+
+def test_positions_with_and_without_velocity() -> None:
+    state = follow.on_actuators(
+        fresh(), ActuatorsMessage(position=(0.1, 0.2), velocity=(0.3, 0.4)), 10.2
+    )
+    assert [(a.position, a.velocity) for a in state.actuators] == [(0.1, 0.3), (0.2, 0.4)]
+    state = follow.on_actuators(state, ActuatorsMessage(position=(0.5, 0.6)), 10.3)
+    assert [(a.position, a.velocity) for a in state.actuators] == [(0.5, None), (0.6, None)]
+
+
+def test_a_prediction_is_shown_until_its_primitive_ends() -> None:
+    state = follow.on_prediction(fresh(), PREDICTION, 10.1)
+    boom = state.actuators[1]
+    assert (boom.sign, boom.displacement, boom.spread, boom.endpoint) == (-1, -0.1, 0.02, 0.7)
+    assert state.observations == 12
+    ended = structs.replace(PREDICTION, event="ended", displacement={"swing": 0.7, "boom": -0.1})
+    state = follow.on_prediction(state, ended, 10.2)
+    assert {(a.sign, a.displacement) for a in state.actuators} == {(0, None)}
+    assert state.prediction_received_s is None
+
+
+def test_a_primitive_seen_too_seldom_has_a_direction_but_no_prediction() -> None:
+    young = structs.replace(PREDICTION, mean=None, scale=None, dof=None, endpoint=None)
+    state = follow.on_prediction(fresh(), young, 10.1)
+    assert [a.sign for a in state.actuators] == [1, -1]
+    assert state.actuators[0].displacement is None
+    assert state.prediction_received_s is None
+
+
+def test_health_comes_from_the_heartbeat_and_its_changes_are_told() -> None:
+    state = follow.on_heartbeat(fresh(), HEARTBEAT, 10.0)
+    assert state.protection is Protection.MONITORING
+    assert state.health is not None
+    assert (state.health.loop_p99_ms, state.health.sweep_p50_ms) == (4.2, None)
+    lost = structs.replace(
+        HEARTBEAT,
+        status="not_monitoring",
+        reasons=(Reason(code="joystick_stale", text="no joystick for 0.7 s"),),
+    )
+    state = follow.on_heartbeat(state, lost, 10.2)
+    assert state.protection is Protection.NOT_MONITORING
+    state = follow.on_heartbeat(state, HEARTBEAT, 10.4)
+    assert texts(state) == ["monitoring again", "NOT MONITORING: no joystick for 0.7 s"]
+
+
+def test_an_alert_rises_and_clears() -> None:
+    state = alerts({}, {"level": "imminent", "text": "bucket → wall in 0.4 s"})
+    assert [(a.zone, a.level) for a in state.alerts] == [("wall", Level.IMMINENT)]
+    cleared = sent(structs.replace(ALERT, level="clear", state="normal"))
+    state = follow.on_alert(state, cleared, 11.0)
+    assert state.alerts == ()
+    assert texts(state) == [
+        "wall: clear",
+        "wall: bucket → wall in 0.4 s",
+        "wall: bucket → wall in 1.4 s",
+    ]
+
+
+def test_a_repeat_tells_nothing_new_but_keeps_the_alert_fresh() -> None:
+    state = alerts({}, {}, {})
+    assert len(state.events) == 1
+    assert state.alerts[0].received_s == pytest.approx(10.2)
+
+
+def test_a_contact_tells_the_lead_of_its_warning_once() -> None:
+    state = alerts(
+        {},
+        {"level": "imminent", "published_unix_s": 1e9 + 0.5},
+        {"level": "imminent", "source": "contact", "published_unix_s": 1e9 + 0.84},
+        {"level": "imminent", "source": "contact", "published_unix_s": 1e9 + 1.04},
+    )
+    assert texts(state)[0] == "wall: entered; warned 0.84 s ahead"
+    assert sum("entered" in text for text in texts(state)) == 1
+
+
+def test_a_contact_without_a_warning_says_so() -> None:
+    state = alerts({"level": "imminent", "source": "contact"})
+    assert texts(state) == ["wall: entered WITHOUT A WARNING"]
+    # A caution long before is no warning.
+    state = alerts({"level": "caution"}, {"level": "imminent", "source": "contact"})
+    assert texts(state)[0] == "wall: entered WITHOUT A WARNING"
+
+
+def test_quality_state_and_system_alerts_are_kept() -> None:
+    state = alerts({"quality": "stale", "state": "acked"})
+    assert not state.alerts[0].trusted
+    assert not state.alerts[0].attention
+    state = alerts({"zone": None, "source": "system", "level": "clear", "state": "rtn_unacked"})
+    assert state.alerts[0].zone == "system"
+    assert state.alerts[0].gone
+
+
+def test_a_restarted_guard_takes_its_old_alerts_with_it() -> None:
+    state = alerts({})
+    state = follow.on_heartbeat(state, structs.replace(HEARTBEAT, boot_id="boot-2"), 11.0)
+    assert state.alerts == ()
+    assert "the guard restarted" in texts(state)
+
+
+def test_who_comes_late_catches_up_from_the_state_message() -> None:
+    message = State(heartbeat=HEARTBEAT, alerts=(ALERT,), predictions=(PREDICTION,), position=None)
+    state = follow.on_state(fresh(), decode(encode(message), State), 10.0)
+    assert state.protection is Protection.MONITORING
+    assert len(state.alerts) == 1
+    assert state.observations == 12
+
+
+def test_events_are_bounded() -> None:
+    state = fresh()
+    for i in range(200):
+        state = follow.add_event(state, Level.CLEAR, str(i))
+    assert len(state.events) == 50
+    assert state.events[0].text == "199"

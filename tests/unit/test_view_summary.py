@@ -1,0 +1,62 @@
+"""The closing table."""
+
+from __future__ import annotations
+
+import io
+
+from rich.console import Console
+
+from rampe_guard.view.summary import Tally, ZoneTally, summary
+
+
+def shown(tally: Tally) -> str:
+    console = Console(record=True, width=80, file=io.StringIO())
+    console.print(summary(tally))
+    return console.export_text()
+
+
+def row(text: str, zone: str) -> str:
+    line = next(line for line in text.splitlines() if line.startswith(zone))
+    return " ".join(line.split())
+
+
+def test_every_figure_has_its_place() -> None:
+    text = shown(
+        Tally(
+            [
+                ZoneTally("wall", 3, (0.61, 0.42, 1.2), 1),
+                ZoneTally("power-line", 1, (0.9,), 0),
+            ],
+            duration_s=120.0,
+            cycles=12,
+            loop_p50_ms=1.1,
+            loop_p99_ms=4.2,
+        )
+    )
+    assert row(text, "wall") == "wall 3 3 0 0.42 s 0.61 s 1.20 s 1"
+    assert row(text, "all") == "all 4 4 0 0.42 s 0.76 s 1.20 s 1"
+    assert "All 4 contacts were warned of, the latest 0.42 s ahead." in text
+    assert "12 cycles in 2.0 min" in text
+    assert "0.25 false alarms per minute and zone" in text
+    assert "1.1 ms p50" in text
+
+
+def test_a_miss_is_the_headline() -> None:
+    text = shown(Tally([ZoneTally("wall", 3, (0.6,), 0)], duration_s=60.0))
+    assert "✖ 2 of 3 contacts came without a warning." in text
+    assert "All" not in text
+
+
+def test_a_run_without_contacts_claims_nothing() -> None:
+    text = shown(Tally([ZoneTally("wall", 0, (), 0)], duration_s=60.0))
+    assert row(text, "wall") == "wall 0 0 0 — — — 0"
+    assert "shows nothing about warning" in text
+
+
+def test_contacts_without_an_answer_are_told() -> None:
+    text = shown(Tally([ZoneTally("wall", 1, (0.5,), 0, unknown_contacts=1)], duration_s=60.0))
+    assert "1 contacts rest on sweeps without an answer" in text
+
+
+def test_no_time_and_no_zones_are_no_error() -> None:
+    assert "all" in shown(Tally([], duration_s=0.0))
