@@ -108,8 +108,12 @@ def _banner(state: ViewState, width: int) -> list[Text]:
     return rows
 
 
+def _lost(state: ViewState) -> bool:
+    return state.protection in {Protection.NOT_MONITORING, Protection.UNAVAILABLE}
+
+
 def _basis(state: ViewState) -> str:
-    if state.prediction_received_s is None or state.observations is None:
+    if state.prediction_received_s is None or state.observations is None or _lost(state):
         return "no prediction"
     seen = state.observations
     return f"prediction from {seen} earlier move{'' if seen == 1 else 's'} like this"
@@ -118,7 +122,7 @@ def _basis(state: ViewState) -> str:
 def _actuators(state: ViewState, width: int) -> Table:
     table = Table(box=None, padding=(0, 1, 0, 0), header_style=GREY, width=width)
     stale = state.position_stale
-    lost = state.protection in {Protection.NOT_MONITORING, Protection.UNAVAILABLE}
+    lost = _lost(state)
     bar = 20 if width < WIDE else width - 72
     table.add_column("", no_wrap=True, width=9, overflow="ellipsis")
     table.add_column("travel", width=bar, no_wrap=True)
@@ -149,9 +153,9 @@ def _actuators(state: ViewState, width: int) -> Table:
 
 def _alerts(state: ViewState, width: int) -> RenderableType:
     if not state.alerts:
-        if state.protection in {Protection.MONITORING, Protection.DEGRADED}:
-            return Text(" none", GREY)
-        return Text(" unknown: see above", "bold yellow")
+        if _lost(state):
+            return Text(" unknown: see above", "bold yellow")
+        return Text(" none", GREY)
     table = Table(box=None, padding=(0, 1, 0, 0), header_style=GREY, width=width, show_header=False)
     for justify in ("left", "left", "right", "right", "left"):
         table.add_column(justify=justify, no_wrap=True, overflow="ellipsis")

@@ -42,8 +42,8 @@ def work(habits: Habits, cycles: int, seed: int = 3) -> tuple[list[Tick], list[s
 
 
 def test_he_reaches_each_waypoint_about_where_he_aims() -> None:
-    ticks, phases, operator = work(NEVER, 8)
-    assert operator.cycles == 8
+    ticks, phases, operator = work(NEVER, 5)
+    assert operator.cycles == 5
     assert operator.overshoots == 0
     ends = [
         (name, tick.position)

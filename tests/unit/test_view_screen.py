@@ -189,6 +189,7 @@ def test_stale_positions_say_so() -> None:
 def test_no_forecast_is_drawn_while_nobody_monitors() -> None:
     lost = replace(CALM, health=replace(HEALTH, protection=Protection.NOT_MONITORING))
     assert "▷" not in shown(render(lost))
+    assert "no prediction" in shown(render(lost))
 
 
 def test_degraded_shows_its_reason_and_keeps_monitoring() -> None:
