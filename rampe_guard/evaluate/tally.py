@@ -24,6 +24,11 @@ class Tally:
         self._first_s: float | None = None
         self._last_s = 0.0
 
+    @property
+    def duration_s(self) -> float:
+        """Time watched [s]."""
+        return 0.0 if self._first_s is None else self._last_s - self._first_s
+
     def position(self, time_s: float, q: FloatArray) -> tuple[ContactEvent, ...]:
         """Take where the arm truly was; returns entries and exits that this shows."""
         if self._first_s is None:

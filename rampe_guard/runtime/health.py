@@ -10,7 +10,7 @@ import numpy as np
 
 from rampe_guard import __version__, wire
 from rampe_guard.core.monitor import Health, Status
-from rampe_guard.core.types import InputName
+from rampe_guard.core.types import FloatArray, InputName, PathSweeper, SweepResult
 from rampe_guard.settings import Site
 
 _TIMES = 1000
@@ -34,6 +34,23 @@ class Durations:
             return None
         p50, p99 = np.percentile(self._values, [50, 99])
         return wire.Quantiles(p50=float(p50), p99=float(p99))
+
+
+class TimedSweeper:
+    """A sweeper whose times are noted."""
+
+    def __init__(self, inner: PathSweeper, spent: Durations) -> None:
+        self._inner = inner
+        self._spent = spent
+
+    def sweep(
+        self, start: FloatArray, displacement: FloatArray, *, any_path: bool = False
+    ) -> SweepResult:
+        """See `PathSweeper.sweep`."""
+        result = self._inner.sweep(start, displacement, any_path=any_path)
+        if result.elapsed_ms is not None:
+            self._spent.add(result.elapsed_ms)
+        return result
 
 
 class Rates:

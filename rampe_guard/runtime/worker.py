@@ -19,7 +19,7 @@ from rampe_guard.core.events import AlertEvent, Event, PredictionEvent
 from rampe_guard.core.monitor import Status
 from rampe_guard.core.types import Inputs
 from rampe_guard.errors import MessageError
-from rampe_guard.runtime.health import Pulse
+from rampe_guard.runtime.health import Pulse, TimedSweeper
 from rampe_guard.runtime.intake import Intake
 from rampe_guard.runtime.messages import Scribe
 from rampe_guard.runtime.replay import IDLE_STEP_S
@@ -51,10 +51,10 @@ class Worker:
         self._bus, self._say = bus, say
         boot = boot_id()
         start_s = time.monotonic()
-        self._guard = machine.guard(start_s, boot)
         self._scribe = Scribe(site, boot, _unix_s)
         self._pulse = Pulse(site, boot, start_s, _unix_s, site.scene.content_hash)
-        self._sweeper = machine.sweeper
+        timed = TimedSweeper(machine.sweeper, self._pulse.sweep_ms)
+        self._guard = machine.guard(start_s, boot, timed)
         self._intake = Intake(bus, site, say)
         self._alerts = bus.outbox(f"{base}/alert", "rampe.alert.v1", urgent=True)
         self._predictions = bus.outbox(f"{base}/prediction", "rampe.prediction.v1")
@@ -92,7 +92,6 @@ class Worker:
         for event in events:
             self._publish(event, compute_ms)
         if inputs.actuators:
-            self._pulse.sweep_ms.add(self._sweeper.spent_ms())
             self._pulse.loop_ms.add((time.perf_counter() - began) * 1e3)
 
     def _publish(self, event: Event, compute_ms: float | None) -> None:

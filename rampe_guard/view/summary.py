@@ -33,7 +33,7 @@ class ZoneTally:
 
 
 @dataclass(frozen=True, slots=True)
-class Tally:
+class Summary:
     """What happened in a run.
 
     Attributes:
@@ -51,7 +51,7 @@ class Tally:
     loop_p99_ms: float | None = None
 
 
-def summary(tally: Tally) -> RenderableType:
+def summary(tally: Summary) -> RenderableType:
     """Lay out the table, its totals and one line of verdict."""
     table = Table(box=None, padding=(0, 2, 0, 0), header_style=GREY)
     table.add_column("zone", no_wrap=True, overflow="ellipsis", max_width=24)
@@ -98,7 +98,7 @@ def _verdict(zone: ZoneTally) -> Text:
     return Text(text, "bold")
 
 
-def _run(tally: Tally, everything: ZoneTally) -> str:
+def _run(tally: Summary, everything: ZoneTally) -> str:
     minutes = tally.duration_s / 60.0
     watched = minutes * len(tally.zones)
     work = "" if tally.cycles is None else f"{tally.cycles} cycles in "

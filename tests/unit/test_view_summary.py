@@ -6,10 +6,10 @@ import io
 
 from rich.console import Console
 
-from rampe_guard.view.summary import Tally, ZoneTally, summary
+from rampe_guard.view.summary import Summary, ZoneTally, summary
 
 
-def shown(tally: Tally) -> str:
+def shown(tally: Summary) -> str:
     console = Console(record=True, width=80, file=io.StringIO())
     console.print(summary(tally))
     return console.export_text()
@@ -22,7 +22,7 @@ def row(text: str, zone: str) -> str:
 
 def test_every_figure_has_its_place() -> None:
     text = shown(
-        Tally(
+        Summary(
             [
                 ZoneTally("wall", 3, (0.61, 0.42, 1.2), 1),
                 ZoneTally("power-line", 1, (0.9,), 0),
@@ -42,21 +42,21 @@ def test_every_figure_has_its_place() -> None:
 
 
 def test_a_miss_is_the_headline() -> None:
-    text = shown(Tally([ZoneTally("wall", 3, (0.6,), 0)], duration_s=60.0))
+    text = shown(Summary([ZoneTally("wall", 3, (0.6,), 0)], duration_s=60.0))
     assert "✖ 2 of 3 contacts came without a warning." in text
     assert "All" not in text
 
 
 def test_a_run_without_contacts_claims_nothing() -> None:
-    text = shown(Tally([ZoneTally("wall", 0, (), 0)], duration_s=60.0))
+    text = shown(Summary([ZoneTally("wall", 0, (), 0)], duration_s=60.0))
     assert row(text, "wall") == "wall 0 0 0 — — — 0"
     assert "shows nothing about warning" in text
 
 
 def test_contacts_without_an_answer_are_told() -> None:
-    text = shown(Tally([ZoneTally("wall", 1, (0.5,), 0, unknown_contacts=1)], duration_s=60.0))
+    text = shown(Summary([ZoneTally("wall", 1, (0.5,), 0, unknown_contacts=1)], duration_s=60.0))
     assert "1 contacts rest on sweeps without an answer" in text
 
 
 def test_no_time_and_no_zones_are_no_error() -> None:
-    assert "all" in shown(Tally([], duration_s=0.0))
+    assert "all" in shown(Summary([], duration_s=0.0))

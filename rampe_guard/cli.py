@@ -1,0 +1,185 @@
+"""The command line: parses arguments, calls, prints. See ``rampe-guard --help``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Sequence
+
+from rampe_guard import __version__
+from rampe_guard.errors import RampeGuardError
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command; returns its exit code (0, or 2 for an error that a user can mend)."""
+    args = _parser().parse_args(argv)
+    try:
+        code: int = args.command(args)
+    except RampeGuardError as error:
+        print(f"rampe-guard: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:  # `| head` has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    return code
+
+
+# Each command imports what it needs: `schema` should not wait for meshes and Zenoh.
+
+
+def _demo(args: argparse.Namespace) -> int:
+    from rich.console import Console
+
+    from rampe_guard.programs.demo import demo
+    from rampe_guard.runtime.stopping import StopFlag
+
+    return demo(args.cycles, args.seed, Console(), StopFlag.on_signals())
+
+
+def _run(args: argparse.Namespace) -> int:
+    from rampe_guard.runtime.daemon import run
+    from rampe_guard.runtime.say import configure
+    from rampe_guard.runtime.stopping import StopFlag
+
+    configure()
+    return run(args.site, args.connect, StopFlag.on_signals())
+
+
+def _check(args: argparse.Namespace) -> int:
+    from rich.console import Console
+
+    from rampe_guard.programs.checkup import checkup
+
+    return checkup(args.site, Console())
+
+
+def _sweep(args: argparse.Namespace) -> int:
+    from rampe_guard.programs.sweeping import sweep_lines
+
+    for line in sweep_lines(args.site, sys.stdin.buffer):
+        print(line.decode(), flush=True)
+    return 0
+
+
+def _watch(args: argparse.Namespace) -> int:
+    from rich.console import Console
+
+    from rampe_guard.programs.watching import watch_site
+    from rampe_guard.runtime.stopping import StopFlag
+
+    return watch_site(args.site, args.connect, Console(), StopFlag.on_signals())
+
+
+def _replay(args: argparse.Namespace) -> int:
+    from rampe_guard.programs.replaying import replay_live, replay_offline
+    from rampe_guard.runtime.stopping import StopFlag
+
+    stop = StopFlag.on_signals()
+    if args.live:
+        return replay_live(args.site, args.log, args.connect, args.speed, stop)
+    for line in replay_offline(args.site, args.log, stop, repeats=args.repeats):
+        print(line.decode())
+    return 0
+
+
+def _schema(args: argparse.Namespace) -> int:
+    from rampe_guard.settings import scene_schema, site_schema
+    from rampe_guard.wire import json_schemas
+
+    schemas = {"site": site_schema(), "scene": scene_schema(), **json_schemas()}
+    if args.name is None:
+        print(json.dumps(schemas, indent=2))
+    elif args.name in schemas:
+        print(json.dumps(schemas[args.name], indent=2))
+    else:
+        raise RampeGuardError(f"no schema {args.name!r}; there are {', '.join(schemas)}")
+    return 0
+
+
+def _ack(args: argparse.Namespace) -> int:
+    from rampe_guard.programs.watching import acknowledge
+
+    return acknowledge(args.site, args.connect, args.alert, args.who)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="rampe-guard",
+        description="Collision early warning for machines that a person drives.",
+    )
+    parser.add_argument("--version", action="version", version=f"rampe-guard {__version__}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    demo = commands.add_parser("demo", help="everything on this machine, with a live view")
+    demo.add_argument("--cycles", type=_positive_int, default=8, help="work cycles (default 8)")
+    demo.add_argument("--seed", type=int, default=1, help="of the operator's day (default 1)")
+    demo.set_defaults(command=_demo)
+
+    run = commands.add_parser("run", help="the daemon")
+    _site(run, connect=True)
+    run.set_defaults(command=_run)
+
+    check = commands.add_parser("check", help="validate site, scene, meshes and kinematics")
+    _site(check)
+    check.set_defaults(command=_check)
+
+    sweep = commands.add_parser("sweep", help="motions as JSON lines in, certificates out")
+    _site(sweep)
+    sweep.set_defaults(command=_sweep)
+
+    watch = commands.add_parser("watch", help="one machine on the terminal")
+    _site(watch, connect=True)
+    watch.set_defaults(command=_watch)
+
+    replay = commands.add_parser("replay", help="a CSV log through the guard")
+    _site(replay, connect=True)
+    replay.add_argument("log", help="CSV file; columns as the site file's 'log' says")
+    replay.add_argument("--live", action="store_true", help="publish it onto Zenoh instead")
+    replay.add_argument("--speed", type=_positive, default=1.0, help="with --live (default 1)")
+    replay.add_argument("--repeats", action="store_true", help="also print repeats of alerts")
+    replay.set_defaults(command=_replay)
+
+    schema = commands.add_parser("schema", help="JSON Schemas of messages and files")
+    schema.add_argument("name", nargs="?", help="one of them, such as rampe.alert.v1")
+    schema.set_defaults(command=_schema)
+
+    ack = commands.add_parser("ack", help="acknowledge an alert")
+    _site(ack, connect=True)
+    ack.add_argument("alert", help="its alert_id")
+    ack.add_argument("--who", required=True, help="who has seen it")
+    ack.set_defaults(command=_ack)
+    return parser
+
+
+def _site(parser: argparse.ArgumentParser, *, connect: bool = False) -> None:
+    parser.add_argument("site", help="site file (YAML)")
+    if connect:
+        parser.add_argument(
+            "--connect",
+            action="append",
+            default=[],
+            metavar="ENDPOINT",
+            help="Zenoh endpoint instead of the site file's, such as tcp/127.0.0.1:7447",
+        )
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not above 0")
+    return value
+
+
+def _positive_int(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{text} is not above 0")
+    return value
+
+
+if __name__ == "__main__":
+    sys.exit(main())

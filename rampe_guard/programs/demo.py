@@ -1,0 +1,168 @@
+"""``rampe-guard demo``: everything on this machine, each part a process of its own.
+
+A router, a simulated excavator with its operator, and the guard talk over loopback; this
+process only watches, like any dashboard would, and keeps the score with the true motion.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from rich.console import Console
+
+from rampe_guard import wire
+from rampe_guard.assembly import load_machine
+from rampe_guard.core.alarm import Level
+from rampe_guard.errors import ConnectionFailedError
+from rampe_guard.evaluate.tally import Tally
+from rampe_guard.programs.scoring import closing_table
+from rampe_guard.resources import shipped_site
+from rampe_guard.runtime.connecting import connect_to
+from rampe_guard.runtime.say import Sayer
+from rampe_guard.runtime.stopping import StopFlag
+from rampe_guard.runtime.zenoh_io import Bus
+from rampe_guard.settings import load_site
+from rampe_guard.view.observer import Heard, Observer
+from rampe_guard.view.watch import watch
+
+_START_S = 30.0
+_END_S = 3.0
+_SCORE_S = 0.035
+_AFTERMATH_S = 1.0
+"""How long the guard may still speak after the operator has gone home [s]."""
+
+
+def demo(cycles: int, seed: int, console: Console, stop: StopFlag) -> int:
+    """Run the demo; returns the exit code.
+
+    Args:
+        cycles: work cycles of the simulated operator.
+        seed: of his day.
+        console: where the screen and the summary go.
+        stop: ends it early, with a summary of what there was.
+    """
+    endpoint = f"tcp/127.0.0.1:{_free_port()}"
+    site_path = str(shipped_site("demo"))
+    site = connect_to(load_site(site_path), [endpoint])
+    with contextlib.ExitStack() as stack:
+        start = stack.enter_context(_children())
+        router = start("router", ["-m", "rampe_guard.runtime.router", endpoint])
+        guard = start("guard", ["-m", "rampe_guard", "run", site_path, "--connect", endpoint])
+        machine = load_machine(site)
+        bus = Bus.open_retrying(site.zenoh, stop, Sayer("rampe_guard.demo").info, stop.wait)
+        if bus is None:
+            return 0
+        stack.enter_context(bus)
+        observer = Observer(bus, site, machine.arm.limits)
+        _wait_for_heartbeat(observer, stop, [router, guard])
+        work = ["-m", "rampe_guard.simulate.process", "--connect", endpoint]
+        operator = start("operator", [*work, "--cycles", str(cycles), "--seed", str(seed)])
+        score = _Score(Tally(machine.sweeper, machine.sweeper.zones), operator, [router, guard])
+        watch(observer, stop, console, score.take)
+    console.print(closing_table(score.tally, None if stop() else cycles, score.loop_ms))
+    return 0
+
+
+@dataclass
+class _Score:
+    """Takes what was heard to the tally, and knows when the work is over."""
+
+    tally: Tally
+    operator: subprocess.Popen[bytes]
+    needed: Sequence[subprocess.Popen[bytes]]
+    loop_ms: wire.Quantiles | None = None
+    _last_s: float = float("-inf")
+    _over_s: float | None = field(default=None)
+
+    def take(self, heard: list[Heard]) -> bool:
+        """Score what was heard; True when the operator has gone and all is said."""
+        for message in heard:
+            if isinstance(message, wire.ActuatorsMessage) and message.stamp is not None:
+                self._position(message.stamp, message.position)
+            elif isinstance(message, wire.Alert) and message.zone is not None:
+                level = Level[message.level.upper()]
+                self.tally.alert(message.published_unix_s, message.zone, level)
+            elif isinstance(message, wire.Heartbeat):
+                self.loop_ms = message.loop_ms or self.loop_ms
+        _check_alive(self.needed)
+        if self.operator.poll() is None:
+            return False
+        self._over_s = self._over_s or time.monotonic()
+        return time.monotonic() - self._over_s > _AFTERMATH_S
+
+    def _position(self, stamp_s: float, position: Sequence[float]) -> None:
+        # swept from sample to sample, so a coarser step misses nothing
+        if stamp_s - self._last_s >= _SCORE_S:
+            self._last_s = stamp_s
+            self.tally.position(stamp_s, np.array(position))
+
+
+@contextlib.contextmanager
+def _children() -> Iterator[_Starter]:
+    """Start processes; all of them are ended, by pid, when the context is left."""
+    starter = _Starter()
+    try:
+        yield starter
+    finally:
+        for process in reversed(starter.processes):
+            process.terminate()
+        for process in starter.processes:
+            try:
+                process.wait(_END_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+
+
+class _Starter:
+    def __init__(self) -> None:
+        self.processes: list[subprocess.Popen[bytes]] = []
+
+    def __call__(self, name: str, arguments: Sequence[str]) -> subprocess.Popen[bytes]:
+        # one thread each: the maths is small, and the cores are shared
+        environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "RAMPE_GUARD_PART": name}
+        process = subprocess.Popen(  # noqa: S603 - our own modules
+            [sys.executable, *arguments],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            env=environment,
+            start_new_session=True,  # Ctrl-C is for this process, which then ends the others
+        )
+        self.processes.append(process)
+        return process
+
+
+def _wait_for_heartbeat(
+    observer: Observer, stop: StopFlag, needed: Sequence[subprocess.Popen[bytes]]
+) -> None:
+    until = time.monotonic() + _START_S
+    while observer.state.health is None and not stop.wait(0.05):
+        _check_alive(needed)
+        if time.monotonic() > until:
+            raise ConnectionFailedError(f"the guard gave no heartbeat within {_START_S:g} s")
+        observer.poll()
+
+
+def _check_alive(needed: Sequence[subprocess.Popen[bytes]]) -> None:
+    for process in needed:
+        if process.poll() is not None:
+            raise ConnectionFailedError(
+                f"process {process.pid} of the demo ended with code {process.returncode};"
+                f" start it by hand to see why: {' '.join(map(str, process.args))}"  # type: ignore[arg-type]
+            )
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port

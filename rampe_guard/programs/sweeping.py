@@ -1,0 +1,52 @@
+"""``rampe-guard sweep``: motions as JSON lines in, certificates as JSON lines out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from rampe_guard import wire
+from rampe_guard.assembly import Sweeper
+from rampe_guard.errors import MessageError
+from rampe_guard.settings import load_site
+
+
+def sweep_lines(site_path: str, lines: Iterable[bytes]) -> Iterator[bytes]:
+    """One reply a line; a line that is no motion gets the certificate ``unknown`` and a reason."""
+    site = load_site(site_path)
+    sweeper = Sweeper(site)
+    n = len(site.actuator_names)
+    for number, line in enumerate(lines, start=1):
+        if not line.strip():
+            continue
+        try:
+            request = wire.decode_sweep_request(line, n)
+        except MessageError as error:
+            yield wire.encode(_unknown(f"line {number}: {error}"))
+            continue
+        result = sweeper.sweep(request.start, request.displacement, any_path=request.any_path)
+        yield wire.encode(
+            wire.SweepReply(
+                certificate=result.certificate.value,
+                contact_fraction=result.contact_fraction,
+                link=result.link,
+                zone=result.zone,
+                contact_point_m=result.contact_point_m,
+                clearance_m=result.clearance_m,
+                any_path=None if result.any_path is None else result.any_path.value,
+                elapsed_ms=result.elapsed_ms,
+            )
+        )
+
+
+def _unknown(error: str) -> wire.SweepReply:
+    return wire.SweepReply(
+        certificate="unknown",
+        contact_fraction=None,
+        link=None,
+        zone=None,
+        contact_point_m=None,
+        clearance_m=None,
+        any_path="unknown",
+        elapsed_ms=None,
+        error=error,
+    )

@@ -1,0 +1,40 @@
+"""``rampe-guard run``: load, connect (for as long as it takes), work, end cleanly."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rampe_guard.assembly import load_machine
+from rampe_guard.errors import SettingsError
+from rampe_guard.runtime.connecting import connect_to
+from rampe_guard.runtime.say import Sayer
+from rampe_guard.runtime.stopping import StopFlag
+from rampe_guard.runtime.worker import Worker
+from rampe_guard.runtime.zenoh_io import Bus
+from rampe_guard.settings import load_site
+
+
+def run(site_path: str, endpoints: Sequence[str], stop: StopFlag) -> int:
+    """Guard a machine until told to stop.
+
+    Raises:
+        SettingsError: the site file is wrong.
+        GeometryError: its geometry cannot be used.
+    """
+    say = Sayer("rampe_guard")
+    site = connect_to(load_site(site_path), endpoints)
+    if site.format != "json":
+        raise SettingsError(
+            f"{site.path}: format: {site.format!r} is not supported by this version; use json"
+        )
+    machine = load_machine(site)
+    say.info(f"{site.machine} at {site.name}: {len(machine.sweeper.zones)} zones loaded")
+    bus = Bus.open_retrying(site.zenoh, stop, lambda text: say.warn("connect", text), stop.wait)
+    if bus is None:
+        return 0
+    with bus:
+        worker = Worker(machine, bus, say)
+        say.info(f"guarding on {site.keys.base}")
+        worker.run(stop, stop.wait)
+    say.info("stopped")
+    return 0
