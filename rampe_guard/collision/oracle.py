@@ -1,0 +1,163 @@
+"""FCL behind the two questions of the sweep: a direction (never trusted), an exact distance.
+
+What FCL 0.7 may be asked was measured: distances of a BVH to a BVH, a box or a convex are right
+within 0.3 µm; distances of convex shapes can be centimetres too long, so of those only the
+direction is used, and core/convex proves what it gives. Objects are built once and moved.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import fcl
+import numpy as np
+
+from rampe_guard.collision.pieces import SKIN_M, fcl_bvh, fcl_convex
+from rampe_guard.core.convex import ConvexPiece, HalfspacePiece
+from rampe_guard.core.kinematics import apply
+from rampe_guard.core.sweep_problem import Nearest
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rampe_guard.collision.mesh import TriangleMesh
+    from rampe_guard.collision.zones import Solid
+    from rampe_guard.core.convex import ObstaclePiece
+    from rampe_guard.core.types import FloatArray, Point
+
+EXACT_ERROR_M = 1e-6
+"""Three times the largest error seen of a trusted distance [m]; taken off every one."""
+INSIDE = 0.5
+"""Winding number from which a point counts as inside a closed mesh."""
+
+
+class FclOracle:
+    """Implements `core.sweep_problem.ClearanceOracle` for fixed links and zones."""
+
+    def __init__(
+        self,
+        meshes: Sequence[TriangleMesh | None],
+        links: Sequence[Sequence[ConvexPiece]],
+        zones: Sequence[tuple[ObstaclePiece, ...]],
+        solids: Sequence[Solid | None],
+    ) -> None:
+        """``solids`` and ``zones`` run alike; None and () for zones without a body."""
+        self._pieces = [
+            fcl.CollisionObject(fcl_convex(piece.vertices)) for own in links for piece in own
+        ]
+        self._obstacles = [_obstacle(piece) for own in zones for piece in own]
+        self._normals = [
+            -piece.normal if isinstance(piece, HalfspacePiece) else None
+            for own in zones
+            for piece in own
+        ]
+        self._planes = [
+            own[0] if own and isinstance(own[0], HalfspacePiece) else None for own in zones
+        ]
+        self._solids = list(solids)
+        self._hulls = [
+            np.concatenate([piece.vertices for piece in own]) if own else np.zeros((0, 3))
+            for own in links
+        ]
+        self._surfaces = [None if m is None else fcl.CollisionObject(fcl_bvh(m)) for m in meshes]
+        parts = [() if mesh is None else tuple(mesh.components()) for mesh in meshes]
+        self._inner = [np.array([p.vertices[0] for p in own]).reshape(-1, 3) for own in parts]
+        self._closed = [tuple(p for p in own if p.is_watertight()) for own in parts]
+        self._request = fcl.DistanceRequest(enable_nearest_points=True)
+
+    def direction(
+        self, piece: int, obstacle: int, pose: FloatArray, *, swapped: bool
+    ) -> FloatArray | None:
+        """A guess of the unit direction from a link piece to an obstacle piece."""
+        normal = self._normals[obstacle]
+        if normal is not None:
+            return normal
+        a, b = self._pieces[piece], self._obstacles[obstacle]
+        a.setTransform(fcl.Transform(pose[:3, :3], pose[:3, 3]))
+        result = fcl.DistanceResult()
+        if swapped:
+            fcl.distance(b, a, self._request, result)
+            q, p = result.nearest_points
+        else:
+            fcl.distance(a, b, self._request, result)
+            p, q = result.nearest_points
+        if not result.min_distance > 0.0:
+            return None
+        way = q - p
+        length = float(np.sqrt(way @ way))
+        if not 0.0 < length < np.inf:
+            return None
+        return np.asarray(way / length)
+
+    def distance(self, link: int, zone: int, pose: FloatArray) -> Nearest:
+        """Distance of the exact surfaces less EXACT_ERROR_M, 0 in contact or if not computable."""
+        plane, solid = self._planes[zone], self._solids[zone]
+        if plane is not None:
+            points = apply(pose, self._hulls[link])
+            lowest = points[np.argmin(points @ plane.normal)]
+            height = float(lowest @ plane.normal) - plane.offset
+            return Nearest(max(height, 0.0), _point(lowest - height * plane.normal))
+        surface = self._surfaces[link]
+        if solid is None or surface is None:
+            raise ValueError(f"no distance is defined between link {link} and zone {zone}")
+        surface.setTransform(fcl.Transform(pose[:3, :3], pose[:3, 3]))
+        result = fcl.DistanceResult()
+        fcl.distance(surface, solid.body, self._request, result)
+        p, q = (np.asarray(point, dtype=float) for point in result.nearest_points)
+        distance = float(result.min_distance) - solid.radius - EXACT_ERROR_M
+        if not (0.0 < distance < FAR_M and np.isfinite(q).all()):
+            return Nearest(0.0, self._touch(surface, solid, pose))
+        way = p - q
+        return Nearest(distance, _point(q + way * (solid.radius / float(np.linalg.norm(way)))))
+
+    def contained(self, link: int, zone: int, pose: FloatArray) -> Point | None:
+        """A point of the zone inside the link's closed mesh, or of the link inside the zone's."""
+        solid = self._solids[zone]
+        if solid is None:
+            return None
+        rotation, translation = pose[:3, :3], pose[:3, 3]
+        local = (solid.inner - translation) @ rotation
+        found = _inside(self._closed[link], local)
+        if found is not None:
+            return _point(solid.inner[found])
+        points = apply(pose, self._inner[link])
+        found = _inside(solid.closed, points)
+        return None if found is None else _point(points[found])
+
+    def _touch(self, surface: fcl.CollisionObject, solid: Solid, pose: FloatArray) -> Point:
+        """A point of an overlap: where surfaces cross, else a corner of what is inside."""
+        result = fcl.CollisionResult()
+        fcl.collide(surface, solid.body, fcl.CollisionRequest(enable_contact=True), result)
+        points = [np.asarray(contact.pos, dtype=float) for contact in result.contacts]
+        finite = [point for point in points if np.isfinite(point).all()]
+        if finite:
+            return _point(finite[0])
+        result = fcl.DistanceResult()
+        fcl.distance(surface, solid.body, self._request, result)
+        q = np.asarray(result.nearest_points[1], dtype=float)
+        return _point(q if np.isfinite(q).all() and np.abs(q).max() < FAR_M else pose[:3, 3])
+
+
+FAR_M = 1e7
+
+
+def _obstacle(piece: ObstaclePiece) -> fcl.CollisionObject | None:
+    """A hull for proposals of directions; a point or segment gets a skin, which errs by that."""
+    if isinstance(piece, HalfspacePiece):
+        return None
+    return fcl.CollisionObject(fcl_convex(piece.vertices))
+
+
+def _inside(closed: Sequence[TriangleMesh], points: FloatArray) -> int | None:
+    """Index of the first point inside any of the closed meshes."""
+    for mesh in closed:
+        low, high = mesh.vertices.min(axis=0) - SKIN_M, mesh.vertices.max(axis=0) + SKIN_M
+        for index in np.flatnonzero(((points >= low) & (points <= high)).all(axis=1)):
+            if abs(mesh.winding(points[index][None])[0]) > INSIDE:
+                return int(index)
+    return None
+
+
+def _point(values: FloatArray) -> Point:
+    x, y, z = values
+    return float(x), float(y), float(z)

@@ -1,0 +1,117 @@
+"""`FclSweeper`: arm and scene, loaded and ready for certified sweeps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rampe_guard.collision.oracle import FclOracle
+from rampe_guard.collision.pieces import convex_pieces
+from rampe_guard.collision.zones import Solid, build_zone
+from rampe_guard.core.config import SweepConfig
+from rampe_guard.core.scene import ActuatorLimit, Scene
+from rampe_guard.core.sweep import sweep
+from rampe_guard.core.sweep_path import ArmMotion
+from rampe_guard.core.sweep_problem import SweepProblem, Zone
+from rampe_guard.errors import GeometryError
+
+if TYPE_CHECKING:
+    from rampe_guard.collision.urdf import Arm
+    from rampe_guard.core.types import FloatArray, SweepResult
+
+LINK_PIECES = 6
+
+
+class FclSweeper:
+    """Certified sweeps of one arm in one scene; implements `core.types.PathSweeper`.
+
+    The same call gives the same answer whatever was swept before. Not for use by several
+    threads at once: the FCL objects are moved.
+
+    Attributes:
+        arm: as given.
+        scene: as given.
+        zones: names of all zones, in scene order.
+    """
+
+    def __init__(self, arm: Arm, scene: Scene, config: SweepConfig | None = None) -> None:
+        """Build all shapes.
+
+        Raises:
+            GeometryError: if an object of the scene cannot be used.
+        """
+        self.arm, self.scene = arm, scene
+        self.zones = tuple(item.name for item in scene.objects)
+        self._config = SweepConfig() if config is None else config
+        excess = 0.5 * self._config.clearance_tolerance_m
+        links = [
+            [] if mesh is None else convex_pieces(mesh, excess, LINK_PIECES) for mesh in arm.meshes
+        ]
+        points = [
+            np.concatenate([piece.vertices for piece in own]) if own else np.zeros((0, 3))
+            for own in links
+        ]
+        motion = ArmMotion(arm.chain, arm.joints, points, arm.proven[:, 0], arm.proven[:, 1])
+        zones: list[Zone | ActuatorLimit] = []
+        solids: list[Solid | None] = []
+        for item in scene.objects:
+            if isinstance(item, ActuatorLimit):
+                zones.append(_checked(item, len(arm.limits)))
+                solids.append(None)
+            else:
+                zone, solid = build_zone(item, arm.link_names)
+                zones.append(zone)
+                solids.append(solid)
+        bodies = [zone.pieces if isinstance(zone, Zone) else () for zone in zones]
+        self._problem = SweepProblem(motion, arm.link_names, links, zones)
+        self._oracle = FclOracle(arm.meshes, links, bodies, solids)
+
+    def sweep(
+        self,
+        start: FloatArray,
+        displacement: FloatArray,
+        *,
+        any_path: bool = False,
+        clearance: bool = True,
+    ) -> SweepResult:
+        """Sweep from ``start`` (n,) along ``displacement`` (n,), both in actuator units.
+
+        Args:
+            start: actuator values; NaN or infinity make every answer unknown.
+            displacement: their change.
+            any_path: also ask whether any monotone way to the end could touch.
+            clearance: also find how near free zones come; without it they are sooner done and
+                ``clearance_m`` is only what certifying them proved.
+
+        Raises:
+            ValueError: if a shape is wrong.
+        """
+        begin = perf_counter()
+        result = sweep(
+            self._problem,
+            self._oracle,
+            self._config,
+            start,
+            displacement,
+            clearance=clearance,
+            any_path=any_path,
+        )
+        return replace(result, elapsed_ms=1e3 * (perf_counter() - begin))
+
+    def link_poses(self, actuators: FloatArray) -> FloatArray:
+        """World poses (k, L, 4, 4) of all links for actuator values (k, n)."""
+        return self._problem.arm.link_poses(np.asarray(actuators, dtype=float))
+
+
+def _checked(item: ActuatorLimit, actuators: int) -> ActuatorLimit:
+    if not 0 <= item.actuator < actuators:
+        raise GeometryError(
+            f"zone '{item.name}' is about actuator {item.actuator}; the arm has {actuators}"
+        )
+    edges = [edge for edge in (item.above, item.below) if edge is not None]
+    if not edges or not np.isfinite(edges).all():
+        raise GeometryError(f"zone '{item.name}' needs a finite 'above' or 'below'")
+    return item

@@ -1,0 +1,233 @@
+"""Certified search of one path against one zone, on the bounds of `sweep_rows`.
+
+A cell is free when every row's bound exceeds margin + tolerance. What stays in doubt, because
+pieces bulge beyond the surfaces they hold or because the arm is really there, is walked through
+by conservative advancement with exact distances, earliest cell first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rampe_guard.core.sweep_rows import BudgetSpentError, Rows, ratio
+from rampe_guard.core.types import Certificate, ZoneSweep
+
+if TYPE_CHECKING:
+    from rampe_guard.core.config import SweepConfig
+    from rampe_guard.core.sweep_problem import Zone
+    from rampe_guard.core.types import Point
+
+NOISE_M = 1e-6
+"""Smaller changes of a distance than this are no motion [m]."""
+SHARP_M = 1e-3
+"""A piece that bulges less than this stands for its surface when asked which way it moves [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Touch:
+    """Earliest contact so far."""
+
+    fraction: float
+    link: int
+    point: Point
+
+
+class ZoneSearch:
+    """One zone's search; `run` is the way through it."""
+
+    def __init__(
+        self, zone: Zone, rows: Rows, config: SweepConfig, link_names: tuple[str, ...]
+    ) -> None:
+        self._zone, self._rows, self._path = zone, rows, rows.path
+        self._names = link_names
+        self._near = zone.margin_m + config.tolerance_m
+        # What stays proven while stepping: a little more than the margin, so that steps end.
+        self._target = zone.margin_m + 0.5 * config.tolerance_m
+        self._slack = config.clearance_tolerance_m
+        self._least = np.inf
+        """Least distance seen at any sample, about [m]: it says when a bound is sharp."""
+        self._link_now = int(rows.link[np.argmin(rows.start)])
+        self._touch: _Touch | None = None
+
+    def run(self, *, clearance: bool) -> ZoneSweep:
+        """Certify the zone; with ``clearance`` also say how near the path comes to it."""
+        closing = bool(self._path.displacement.any())  # until the contrary is shown
+        done = now_known = False
+        try:
+            self._clearance_now()
+            now_known = True
+            self._certify()
+            done = True
+            closing = closing and self._closing()
+            if clearance and self._touch is None:
+                self._clearance_on_the_way()
+        except BudgetSpentError:
+            pass
+        return self._result(done=done, now_known=now_known, closing=closing)
+
+    # --- the start -------------------------------------------------------------------------
+
+    def _clearance_now(self) -> None:
+        """Raise the bounds at the start until the least is within the tolerance of the truth."""
+        rows = self._rows
+        while True:
+            row = int(np.argmin(rows.start))
+            link = self._link_now = int(rows.link[row])
+            if rows.start[row] >= self._least - self._slack:
+                return
+            if not rows.tried[row, 0]:
+                gap = rows.query(row, 0)
+                if gap > self._near and rows.excess[row] <= self._slack:
+                    self._least = min(self._least, gap + float(rows.excess[row]))
+            elif not rows.knows_start(link):
+                distance = rows.distance(link, 0.0).distance_m
+                self._least = min(self._least, distance)
+                mine = rows.link == link
+                rows.start[mine] = np.maximum(rows.start[mine], distance)
+            else:
+                return
+
+    def _closing(self) -> bool:
+        """Does a link inside the margin, or else the nearest one, come nearer at the start?"""
+        rows = self._rows
+        for row in np.flatnonzero(rows.start <= self._near):
+            if not rows.tried[row, 0]:
+                rows.query(int(row), 0)
+        inside = np.flatnonzero(rows.start <= self._near)
+        if not inside.size:
+            return self._approaches(self._link_now, exact=False)
+        links = sorted({int(link) for link in rows.link[inside]})
+        return any(self._approaches(link, exact=True) for link in links)
+
+    def _approaches(self, link: int, *, exact: bool) -> bool:
+        rows = self._rows
+        mine = np.flatnonzero(rows.link == link)
+        nearest = mine[np.argmin(rows.start[mine])]
+        before, after = (float(gap) for gap in rows.probe[nearest])
+        if before > 0.0 and (not exact or rows.excess[nearest] <= SHARP_M):
+            return after < before - NOISE_M
+        before = rows.distance(link, 0.0).distance_m
+        after = rows.distance(link, self._path.probe).distance_m
+        if before == after == 0.0:
+            return True  # it moves, and nothing shows that it moves out
+        return after < before - NOISE_M
+
+    # --- the way ---------------------------------------------------------------------------
+
+    def _certify(self) -> None:
+        """Clear every doubtful cell, the earliest first, or find the first contact."""
+        rows, s = self._rows, self._path.fractions
+        for cell in range(self._path.cells):
+            while self._touch is None or s[cell] < self._touch.fraction:
+                row = int(np.argmin(rows.doubt[:, cell]))
+                if rows.doubt[row, cell] > self._near:
+                    break
+                if not rows.tried[row, cell]:
+                    rows.query(row, cell)
+                elif not rows.tried[row, cell + 1]:
+                    rows.query(row, cell + 1)
+                else:
+                    self._walk(int(rows.link[row]), cell)
+
+    def _walk(self, link: int, cell: int) -> None:
+        """Conservative advancement of one link through one cell, up to its first contact."""
+        rows = self._rows
+        s, end = self._ends(cell)
+        if self._touch is not None:
+            end = min(end, self._touch.fraction)
+        mine = np.flatnonzero((rows.link == link) & (rows.doubt[:, cell] <= self._near))
+        doubtful = [int(row) for row in mine]
+        while doubtful:
+            rest = end - s
+            steps = [rows.step(row, cell, s, rest, self._target) for row in doubtful]
+            step = min(steps)
+            if step <= 0.0 or step * self._path.rate[cell, link] < self._near - self._target:
+                nearest = rows.distance(link, s)
+                if nearest.distance_m <= self._near:
+                    self._touch = _Touch(s, link, nearest.point_m)
+                    break
+                room = nearest.distance_m - self._target
+                step = max(step, ratio(room, float(self._path.rate[cell, link])))
+            else:
+                doubtful = [row for row, own in zip(doubtful, steps, strict=True) if own < rest]
+            if step >= rest:
+                break
+            s += step
+        rows.doubt[mine, cell] = np.inf
+        rows.bound[mine, cell] = np.maximum(rows.bound[mine, cell], self._zone.margin_m)
+
+    def _clearance_on_the_way(self) -> None:
+        """Raise the bounds until the least over the path is within the tolerance of the truth."""
+        rows = self._rows
+        while True:
+            worst = np.unravel_index(np.argmin(rows.bound), rows.bound.shape)
+            row, cell = int(worst[0]), int(worst[1])
+            if rows.bound[row, cell] >= self._least - self._slack:
+                return
+            sample = cell if not rows.tried[row, cell] else cell + 1
+            if rows.tried[row, sample]:
+                self._sharpen(int(rows.link[row]), cell)
+            else:
+                gap = rows.query(row, sample)
+                if gap > 0.0 and rows.excess[row] <= self._slack:
+                    self._least = min(self._least, gap + float(rows.excess[row]))
+
+    def _sharpen(self, link: int, cell: int) -> None:
+        """Prove that a link stays farther than the least distance seen less the tolerance.
+
+        Meeting less on its way it lowers that least, so every step is worth the tolerance.
+        """
+        rows = self._rows
+        s, end = self._ends(cell)
+        mine = rows.link == link
+        level = np.inf
+        while s < end:
+            distance = rows.distance(link, s).distance_m
+            self._least = min(self._least, distance)
+            level = self._least - self._slack
+            if level <= self._zone.margin_m:
+                return  # that much is proven already
+            s += ratio(distance - level, float(self._path.rate[cell, link]))
+        rows.bound[mine, cell] = np.maximum(rows.bound[mine, cell], level)
+
+    def _ends(self, cell: int) -> tuple[float, float]:
+        return float(self._path.fractions[cell]), float(self._path.fractions[cell + 1])
+
+    # --- the answer ------------------------------------------------------------------------
+
+    def _result(self, *, done: bool, now_known: bool, closing: bool) -> ZoneSweep:
+        rows, margin = self._rows, self._zone.margin_m
+        least = float(rows.bound.min())
+        now = max(float(rows.start.min()), least) - margin if now_known else None
+        proven = done and self._path.end >= 1.0
+        worst_row = int(np.unravel_index(np.argmin(rows.bound), rows.bound.shape)[0])
+        if self._touch is not None:
+            first = self._touch.fraction if done else min(self._touch.fraction, self._doubtful())
+            return ZoneSweep(
+                zone=self._zone.name,
+                certificate=Certificate.CONTACT,
+                contact_fraction=first,
+                link=self._names[self._touch.link],
+                contact_point_m=self._touch.point,
+                clearance_m=0.0,
+                clearance_now_m=now,
+                closing=closing,
+            )
+        return ZoneSweep(
+            zone=self._zone.name,
+            certificate=Certificate.FREE if proven else Certificate.UNKNOWN,
+            contact_fraction=None if proven else self._doubtful(),
+            link=self._names[int(rows.link[worst_row])],
+            contact_point_m=None,
+            clearance_m=max(least - margin, 0.0) if proven else None,
+            clearance_now_m=now,
+            closing=closing,
+        )
+
+    def _doubtful(self) -> float:
+        """First fraction that is not certified."""
+        doubt = np.flatnonzero((self._rows.doubt <= self._near).any(axis=0))
+        return float(self._path.fractions[doubt[0]]) if doubt.size else self._path.end
