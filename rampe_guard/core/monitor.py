@@ -66,6 +66,7 @@ class InputMonitor:
         self._rejected: Counter[tuple[InputName, str]] = Counter()
         self._recent: dict[tuple[InputName, str], float] = {}
         self._window: deque[tuple[float, bool]] = deque()
+        self._bad = 0
         self._unknown_s: float | None = None
         self._joystick_alive: bool | None = None
 
@@ -73,13 +74,13 @@ class InputMonitor:
         """A good sample arrived."""
         self._last_s[name] = arrival_s
         self._accepted[name] += 1
-        self._window.append((arrival_s, True))
+        self._note(arrival_s, good=True)
 
     def reject(self, name: InputName, reason: str, now_s: float) -> None:
         """A message was refused."""
         self._rejected[name, reason] += 1
         self._recent[name, reason] = now_s
-        self._window.append((now_s, False))
+        self._note(now_s, good=False)
 
     def sweep_unknown(self, now_s: float) -> None:
         """A sweep ended without an answer."""
@@ -92,9 +93,14 @@ class InputMonitor:
     def plausible(self, now_s: float) -> bool:
         """Few enough samples are refused that the accepted ones may be learned from."""
         while self._window and self._window[0][0] < now_s - _PLAUSIBLE_WINDOW_S:
-            self._window.popleft()
-        bad = sum(not good for _, good in self._window)
-        return len(self._window) < _ENOUGH_SAMPLES or bad <= _IMPLAUSIBLE_SHARE * len(self._window)
+            _, good = self._window.popleft()
+            self._bad -= not good
+        seen = len(self._window)
+        return seen < _ENOUGH_SAMPLES or self._bad <= _IMPLAUSIBLE_SHARE * seen
+
+    def _note(self, at_s: float, *, good: bool) -> None:
+        self._window.append((at_s, good))
+        self._bad += not good
 
     def health(self, now_s: float) -> Health:
         """Status at ``now_s``."""

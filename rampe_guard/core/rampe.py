@@ -103,7 +103,8 @@ class Rampe:
         half = np.full(actuators, np.pi)
         half[bounded] = (bounds[bounded, 1] - bounds[bounded, 0]) / 2
         self._half = half
-        self._center = np.where(bounded, np.where(bounded, bounds, 0.0).mean(axis=1), 0.0)
+        self._center = np.zeros(actuators)
+        self._center[bounded] = bounds[bounded].mean(axis=1)
         self._memory: dict[Category, CategoryMemory] = {}
 
     @property

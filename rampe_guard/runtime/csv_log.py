@@ -98,16 +98,17 @@ def _rows(path: Path, columns: list[ColumnMap]) -> tuple[FloatArray, list[str]]:
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise LogError(f"{path}: cannot be read: {error}") from None
     if not rows:
-        raise LogError(f"{path}: no usable row")
+        raise LogError(f"{path}: no usable row{'; ' + warnings[0] if warnings else ''}")
     return np.array(rows), warnings
 
 
-def _mapped(row: dict[str, str], columns: list[ColumnMap]) -> tuple[list[float], str]:
+def _mapped(row: dict[str, str | None], columns: list[ColumnMap]) -> tuple[list[float], str]:
     """Mapped values of one row, and what is wrong with it (empty if nothing)."""
-    if None in row or None in row.values():  # how csv marks too many and too few fields
-        return [], "wrong number of fields"
+    missing = [c.column for c in columns if row[c.column] is None]
+    if missing:
+        return [], f"cut off before column {missing[0]!r}"
     try:
-        values = [float(row[c.column]) * c.scale + c.offset for c in columns]
+        values = [float(row[c.column] or "") * c.scale + c.offset for c in columns]
     except ValueError as error:
         return [], str(error)
     if not all(map(math.isfinite, values)):

@@ -1,0 +1,118 @@
+"""``rampe-guard check``: can this site be guarded? Files, meshes, kinematics, scene, keys."""
+
+from __future__ import annotations
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from rampe_guard.assembly import Machine, load_machine
+from rampe_guard.core.scene import ActuatorLimit, SceneObject
+from rampe_guard.core.types import FloatArray
+from rampe_guard.settings import Site, load_site
+
+
+def checkup(site_path: str, console: Console) -> int:
+    """Load everything a guard would load and print what it is; 0 when all of it is usable.
+
+    Raises:
+        SettingsError, GeometryError: what is wrong, and where.
+    """
+    site = load_site(site_path)
+    machine = load_machine(site)
+    pose = resting_pose(machine.arm.limits)
+    console.print(Text(f"{site.machine} at {site.name}", "bold"), Text(f"  {site.path}", "dim"))
+    for table in (_keys(site), _actuators(machine), _links(machine), _zones(machine, pose)):
+        console.print()
+        console.print(table)
+    console.print()
+    for remark in _remarks(machine):
+        console.print(Text(f"note: {remark}", "yellow"))
+    console.print(Text("ok: this site can be guarded", "bold"))
+    return 0
+
+
+def resting_pose(limits: FloatArray) -> FloatArray:
+    """Middle of every actuator's travel (n,); 0 where it is endless."""
+    bounded = np.isfinite(limits).all(axis=1)
+    pose = np.zeros(len(limits))
+    pose[bounded] = limits[bounded].mean(axis=1)
+    return pose
+
+
+def _table(title: str, *columns: str) -> Table:
+    table = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False)
+    for column in columns:
+        table.add_column(column, header_style="dim", overflow="fold")
+    return table
+
+
+def _keys(site: Site) -> Table:
+    table = _table("keys", "what", "key")
+    table.add_row("joystick", site.keys.joystick)
+    table.add_row("actuators", site.keys.actuators)
+    table.add_row("published under", site.keys.base)
+    table.add_row("zenoh", site.zenoh.config or f"{site.zenoh.mode} {' '.join(site.zenoh.connect)}")
+    return table
+
+
+def _actuators(machine: Machine) -> Table:
+    table = _table("actuators", "name", "axis", "joint", "drive", "limits", "top speed", "lag")
+    described = machine.site.arm.joints
+    for j, actuator in enumerate(machine.site.guard.actuators):
+        low, high = machine.arm.limits[j]
+        travel = f"{low:.3g} … {high:.3g} {actuator.unit}" if np.isfinite(high - low) else "endless"
+        joint = described[j]
+        table.add_row(
+            actuator.name,
+            f"{'+' if actuator.sign > 0 else '-'}{actuator.axis}",
+            joint.joint,
+            type(joint.drive).__name__.removesuffix("Drive").lower(),
+            travel,
+            f"{actuator.max_velocity:g} {actuator.unit}/s",
+            f"{actuator.lag_s:g} s",
+        )
+    return table
+
+
+def _links(machine: Machine) -> Table:
+    table = _table("links", "name", "triangles")
+    for name, mesh in zip(machine.arm.link_names, machine.arm.meshes, strict=True):
+        table.add_row(name, "-" if mesh is None else str(len(mesh.faces)))
+    return table
+
+
+def _zones(machine: Machine, pose: FloatArray) -> Table:
+    table = _table("zones, with the arm in the middle of its travel", "name", "type", "margin", "")
+    swept = {z.zone: z for z in machine.sweeper.sweep(pose, np.zeros_like(pose)).zones}
+    for zone in machine.site.scene.objects:
+        found = swept[zone.name]
+        near = found.clearance_now_m
+        where = "unknown" if near is None else f"{near:.2f} {_unit(machine, zone)} clear"
+        if found.inside:
+            where = f"the arm is inside ({found.link or 'actuator'})"
+        margin = "" if isinstance(zone, ActuatorLimit) else f"{zone.margin_m:g} m"
+        table.add_row(zone.name, type(zone).__name__, margin, where)
+    return table
+
+
+def _unit(machine: Machine, zone: SceneObject) -> str:
+    if isinstance(zone, ActuatorLimit):
+        return machine.site.guard.actuators[zone.actuator].unit
+    return "m"
+
+
+def _remarks(machine: Machine) -> list[str]:
+    remarks = [
+        f"joint {name!r} is driven by no actuator and held at {value:g}"
+        for name, value in machine.arm.fixed_joints.items()
+    ]
+    bare = [
+        name
+        for name, mesh in zip(machine.arm.link_names, machine.arm.meshes, strict=True)
+        if mesh is None
+    ]
+    if bare:
+        remarks.append(f"links without geometry are not swept: {', '.join(bare)}")
+    return remarks
