@@ -12,7 +12,6 @@ import build_bench
 import build_excavator
 import build_yard
 
-
 PARTS = (("excavator", build_excavator), ("bench", build_bench), ("scenes", build_yard))
 
 

@@ -15,7 +15,7 @@ from parts import XZ, Joint, both_sides, box, curve, pin, plate, post, union, wr
 
 FOOT_X_M = 0.037
 BOOM_M, STICK_M, BUCKET_M = 0.482, 0.253, 0.115
-STROKES_M = {"boom": (0.0, 0.118), "stick": (0.0, 0.15), "bucket": (0.0, 0.11)}
+STROKES_M = {"boom": (0.0, 0.118), "stick": (0.0, 0.145), "bucket": (0.0, 0.11)}
 
 
 def boom_angle(stroke: float) -> float:
@@ -50,7 +50,13 @@ def links() -> dict[str, Manifold]:
         box((-0.10, -0.055, -0.035), (-0.04, 0.055, 0.03)),
         pin((FOOT_X_M, 0.0), 0.006, -0.036, 0.036),
     )
-    return {"base": pedestal, "house": house, "boom": _boom(), "stick": _stick(), "bucket": _bucket()}
+    return {
+        "base": pedestal,
+        "house": house,
+        "boom": _boom(),
+        "stick": _stick(),
+        "bucket": _bucket(),
+    }
 
 
 def _boom() -> Manifold:

@@ -140,7 +140,15 @@ def _counterweight() -> Manifold:
 def boom() -> Manifold:
     """Bent box section, forked at the stick; lugs for both cylinders."""
     count = 33
-    spine = [(0.0, 0.0), (0.6, 0.20), (1.5, 0.46), (2.4, 0.57), (3.4, 0.44), (4.6, 0.17), (5.75, 0.0)]
+    spine = [
+        (0.0, 0.0),
+        (0.6, 0.20),
+        (1.5, 0.46),
+        (2.4, 0.57),
+        (3.4, 0.44),
+        (4.6, 0.17),
+        (5.75, 0.0),
+    ]
     depth = [(0.0, 0.19), (0.8, 0.27), (2.3, 0.36), (3.5, 0.30), (4.8, 0.22), (5.75, 0.15)]
     middle, half = curve(spine, count), curve(depth, count)[:, 1]
     top = np.column_stack([middle[:, 0], middle[:, 1] + half])
@@ -354,7 +362,9 @@ def drives() -> list[str]:
     )
     strokes = np.linspace(-0.06, bucket.stroke_m + 0.06, 55)
     angles = ", ".join(f"{lk.coupler_angle(q):.5f}" for q in strokes)
-    table = f"{{type: table, actuator: [{', '.join(f'{q:.2f}' for q in strokes)}], joint: [{angles}]}}"
+    table = (
+        f"{{type: table, actuator: [{', '.join(f'{q:.2f}' for q in strokes)}], joint: [{angles}]}}"
+    )
     lines = {
         "boom_joint": cylinder(boom, "pivot", boom.base_angle - boom.rod_angle, 1),
         "stick_joint": cylinder(stick, "pivot", stick.base_angle - stick.rod_angle, -1),

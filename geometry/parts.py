@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import trimesh
 from manifold3d import CrossSection, Manifold, Mesh, OpType, set_circular_segments
+from scipy.interpolate import CubicSpline
 
 set_circular_segments(20)
 
@@ -68,8 +69,6 @@ def both_sides(solid: Manifold) -> Manifold:
 
 def curve(knots: list[XZ], count: int) -> FloatArray:
     """Smooth curve (count, 2) through ``knots`` with increasing x (natural ends)."""
-    from scipy.interpolate import CubicSpline  # noqa: PLC0415 - only the script needs it
-
     points = np.asarray(knots, dtype=float)
     x = np.linspace(points[0, 0], points[-1, 0], count)
     return np.column_stack([x, CubicSpline(points[:, 0], points[:, 1], bc_type="natural")(x)])
