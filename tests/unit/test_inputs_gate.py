@@ -1,0 +1,111 @@
+import numpy as np
+import pytest
+
+from rampe_guard.core.config import ActuatorConfig, InputConfig
+from rampe_guard.core.inputs import Accepted, InputGate, Rejection
+from rampe_guard.core.types import ActuatorSample, JoystickSample
+
+ACTUATORS = (
+    ActuatorConfig("swing", 0, 1, 0.6, 1.2, 0.1, 0.1, "rad"),
+    ActuatorConfig("boom", 1, 1, 0.2, 0.5, 0.1, 0.1, "m"),
+)
+LIMITS = np.array([[-np.inf, np.inf], [0.0, 1.0]])
+
+
+def gate() -> InputGate:
+    return InputGate(ACTUATORS, LIMITS, InputConfig(), axes=2)
+
+
+def lever(stamp: float, *axes: float, arrival: float | None = None) -> JoystickSample:
+    return JoystickSample(stamp, np.array(axes), stamp if arrival is None else arrival)
+
+
+def arm(
+    stamp: float,
+    *q: float,
+    arrival: float | None = None,
+    velocity: tuple[float, ...] | None = None,
+) -> ActuatorSample:
+    v = None if velocity is None else np.array(velocity)
+    return ActuatorSample(stamp, np.array(q), v, stamp if arrival is None else arrival)
+
+
+@pytest.mark.parametrize(
+    ("sample", "reason"),
+    [
+        (lever(1.0, 0.5), "wrong_length"),
+        (lever(1.0, 0.5, float("nan")), "not_finite"),
+        (lever(float("nan"), 0.5, 0.5), "not_finite"),
+        (lever(1.0, 0.5, -1.2), "axis_out_of_range"),
+    ],
+)
+def test_impossible_levers_are_refused(sample: JoystickSample, reason: str) -> None:
+    result = gate().joystick(sample)
+    assert isinstance(result, Rejection)
+    assert (result.input, result.reason) == ("joystick", reason)
+
+
+@pytest.mark.parametrize(
+    ("sample", "reason"),
+    [
+        (arm(1.0, 0.5), "wrong_length"),
+        (arm(1.0, 0.5, 0.5, velocity=(0.1,)), "wrong_length"),
+        (arm(1.0, 0.5, float("inf")), "not_finite"),
+        (arm(1.0, 0.5, 0.5, velocity=(0.1, float("nan"))), "not_finite"),
+        (arm(1.0, 0.0, 1.06), "position_out_of_range"),
+        (arm(1.0, 0.0, -0.06), "position_out_of_range"),
+    ],
+)
+def test_impossible_positions_are_refused(sample: ActuatorSample, reason: str) -> None:
+    result = gate().actuators(sample)
+    assert isinstance(result, Rejection)
+    assert (result.input, result.reason) == ("actuators", reason)
+
+
+def test_a_little_beyond_is_calibration_and_not_a_fault() -> None:
+    result = gate().joystick(lever(1.0, 1.04, -1.03))
+    assert isinstance(result, Accepted)
+    np.testing.assert_array_equal(result.sample.axes, [1.0, -1.0])
+    assert isinstance(gate().actuators(arm(1.0, 100.0, 1.04)), Accepted)
+
+
+def test_extra_axes_are_allowed() -> None:
+    assert isinstance(gate().joystick(lever(1.0, 0.1, 0.2, 0.3)), Accepted)
+
+
+def test_stamps_must_go_on() -> None:
+    g = gate()
+    assert isinstance(g.joystick(lever(10.0, 0, 0)), Accepted)
+    for stamp, reason in ((10.0, "stamp_back"), (9.0, "stamp_back"), (20.0, "stamp_jump")):
+        result = g.joystick(lever(stamp, 0, 0, arrival=10.01))
+        assert isinstance(result, Rejection)
+        assert result.reason == reason
+    assert isinstance(g.joystick(lever(10.02, 0, 0)), Accepted)
+
+
+def test_a_late_burst_after_a_network_stall_is_used() -> None:
+    g = gate()
+    g.actuators(arm(10.0, 0.0, 0.5))
+    for k in range(1, 20):
+        assert isinstance(g.actuators(arm(10.0 + 0.05 * k, 0.0, 0.5, arrival=12.0)), Accepted)
+
+
+def test_an_arm_cannot_jump() -> None:
+    g = gate()
+    g.actuators(arm(1.0, 0.0, 0.2))
+    result = g.actuators(arm(1.1, 0.0, 0.9))
+    assert isinstance(result, Rejection)
+    assert result.reason == "position_jump"
+    assert isinstance(g.actuators(arm(1.2, 0.0, 0.25)), Accepted)
+
+
+@pytest.mark.parametrize("offset", [-100.0, 3600.0])
+def test_a_restarted_sender_is_taken_up_after_its_time_out(offset: float) -> None:
+    g = gate()
+    g.actuators(arm(200.0, 0.0, 0.5, arrival=0.0))
+    results = [
+        g.actuators(arm(200.0 + offset + 0.1 * k, 0.0, 0.5, arrival=0.1 * k)) for k in range(1, 9)
+    ]
+    kinds = [isinstance(r, Accepted) for r in results]
+    assert kinds == [False] * 5 + [True] * 3
+    assert [r.restarted for r in results if isinstance(r, Accepted)] == [True, False, False]

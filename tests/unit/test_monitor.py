@@ -1,0 +1,105 @@
+import pytest
+
+from rampe_guard.core.config import InputConfig
+from rampe_guard.core.monitor import InputMonitor, Status
+
+
+def fed(config: InputConfig | None = None) -> InputMonitor:
+    monitor = InputMonitor(config or InputConfig(), start_s=0.0)
+    monitor.accept("joystick", 1.0)
+    monitor.accept("actuators", 1.0)
+    return monitor
+
+
+def codes(monitor: InputMonitor, now_s: float) -> list[str]:
+    return [r.code for r in monitor.health(now_s).reasons]
+
+
+def test_fresh_inputs_are_ok() -> None:
+    health = fed().health(1.1)
+    assert health.status is Status.OK
+    assert health.reasons == ()
+    assert health.ages_s == {"joystick": pytest.approx(0.1), "actuators": pytest.approx(0.1)}
+
+
+def test_no_data_is_never_ok() -> None:
+    monitor = InputMonitor(InputConfig(), start_s=0.0)
+    assert monitor.health(0.6).status is Status.NOT_MONITORING
+    assert codes(monitor, 0.6) == ["actuators_silent", "joystick_silent"]
+    assert monitor.health(0.6).ages_s == {"joystick": None, "actuators": None}
+
+
+@pytest.mark.parametrize("silent", ["joystick", "actuators"])
+def test_the_silent_input_is_named(silent: str) -> None:
+    monitor = fed()
+    other = "joystick" if silent == "actuators" else "actuators"
+    monitor.accept(other, 2.0)  # type: ignore[arg-type]
+    health = monitor.health(2.0)
+    assert health.status is Status.NOT_MONITORING
+    assert [(r.code, r.input) for r in health.reasons] == [(f"{silent}_silent", silent)]
+
+
+def test_back_by_itself() -> None:
+    monitor = fed()
+    assert monitor.health(3.0).status is Status.NOT_MONITORING
+    monitor.accept("joystick", 3.1)
+    monitor.accept("actuators", 3.1)
+    assert monitor.health(3.1).status is Status.OK
+
+
+def test_time_outs_are_per_input() -> None:
+    monitor = fed(InputConfig(joystick_timeout_s=5.0, actuators_timeout_s=0.2))
+    assert codes(monitor, 1.3) == ["actuators_silent"]
+
+
+def test_an_on_change_joystick_may_be_silent() -> None:
+    monitor = fed(InputConfig(joystick_on_change=True))
+    monitor.accept("actuators", 60.0)
+    assert monitor.health(60.0).status is Status.OK
+
+
+def test_an_on_change_joystick_whose_token_is_gone_is_not() -> None:
+    monitor = fed(InputConfig(joystick_on_change=True))
+    monitor.joystick_alive(alive=True)
+    assert monitor.health(1.1).status is Status.OK
+    monitor.joystick_alive(alive=False)
+    assert codes(monitor, 1.1) == ["joystick_gone"]
+    assert monitor.health(1.1).status is Status.NOT_MONITORING
+
+
+def test_an_on_change_joystick_never_heard_is_degraded() -> None:
+    monitor = InputMonitor(InputConfig(joystick_on_change=True), start_s=0.0)
+    monitor.accept("actuators", 1.0)
+    assert monitor.health(1.0).status is Status.DEGRADED
+    assert codes(monitor, 1.0) == ["joystick_unknown"]
+
+
+def test_a_refusal_is_counted_named_and_forgiven() -> None:
+    monitor = fed(InputConfig(joystick_timeout_s=100, actuators_timeout_s=100))
+    for _ in range(3):
+        monitor.reject("joystick", "bad_json", 1.0)
+    health = monitor.health(2.0)
+    assert health.status is Status.DEGRADED
+    assert health.rejected == {("joystick", "bad_json"): 3}
+    assert [r.code for r in health.reasons] == ["joystick_bad_json"]
+    assert monitor.health(7.0).status is Status.OK
+    assert monitor.health(7.0).rejected == {("joystick", "bad_json"): 3}
+
+
+def test_many_refusals_stop_the_learning_for_a_while() -> None:
+    monitor = InputMonitor(InputConfig(), start_s=0.0)
+    for k in range(100):
+        monitor.accept("joystick", k * 0.05)
+        if k % 5 == 0:
+            monitor.reject("joystick", "axis_out_of_range", k * 0.05)
+    assert not monitor.plausible(5.0)
+    assert "implausible" in codes(monitor, 5.0)
+    for k in range(300):
+        monitor.accept("joystick", 5.0 + k * 0.05)
+    assert monitor.plausible(20.0)
+
+
+def test_an_unanswered_sweep_is_told() -> None:
+    monitor = fed()
+    monitor.sweep_unknown(1.0)
+    assert codes(monitor, 1.1) == ["sweep_unknown"]
