@@ -28,9 +28,11 @@ from ruamel.yaml.events import (
 from rampe_guard.errors import SettingsError
 from rampe_guard.settings.problems import KeyPath, dotted, show
 
-MAX_BYTES = 5 * 1024 * 1024
+MAX_BYTES = 1024 * 1024
+MAX_LINE = 10_000
+"""Longest line in characters: the scanner is quadratic in the length of some tokens."""
 MAX_MESH_BYTES = 512 * 1024 * 1024
-MAX_VALUES = 100_000
+MAX_VALUES = 50_000
 MAX_DEPTH = 24
 
 Container: TypeAlias = "dict[str, Any] | list[Any]"
@@ -121,6 +123,10 @@ def parse(content: bytes | str, file: str) -> Document:
         raise SettingsError(
             f"{file}:{line}: byte 0x{raw[error.start]:02x} is not UTF-8; save the file as UTF-8"
         ) from None
+    for number, line_text in enumerate(text.splitlines(), start=1):
+        if len(line_text) > MAX_LINE:
+            what = f"the line has more than {MAX_LINE} characters"
+            raise SettingsError(f"{file}:{number}: {what}; break it into several")
     builder = _Builder(file)
     try:
         for event in YAML(typ="safe", pure=True).parse(text):
@@ -166,7 +172,9 @@ class _Builder:
             if self.documents > 1:
                 self.refuse("a second document starts here", "keep one document in a file")
         elif isinstance(event, AliasEvent):
-            self.refuse(f"alias *{event.anchor}", "write the value out; aliases are not supported")
+            self.refuse(
+                f"alias {show(event.anchor)}", "write the value out; aliases are not supported"
+            )
         elif isinstance(event, MappingStartEvent | SequenceStartEvent):
             self.check(event)
             self.open({} if isinstance(event, MappingStartEvent) else [])
@@ -189,9 +197,9 @@ class _Builder:
         if self.values > MAX_VALUES:
             self.refuse(f"more than {MAX_VALUES} values", "shorten the file")
         if getattr(event, "anchor", None):
-            self.refuse(f"anchor &{event.anchor}", "remove it; anchors are not supported")
+            self.refuse(f"anchor {show(event.anchor)}", "remove it; anchors are not supported")
         if getattr(event, "tag", None):
-            self.refuse(f"tag {event.tag}", "remove it; tags are not supported")
+            self.refuse(f"tag {show(str(event.tag))}", "remove it; tags are not supported")
 
     def start_key(self, key: str) -> None:
         where = (*self.path, key)

@@ -258,6 +258,11 @@ def test_mistake_is_named_with_line_key_value_and_remedy(
         ("log: {time: {colum: t}, joystick: {}, actuators: {}}", "log.time.column: is missing"),
         ("log: {time: [t], joystick: {}, actuators: {}}", "log.time: a list of 1 is not text"),
         (
+            "log: {time: t, joystick: {swing: {column: a, scale: 0}, boom: b},"
+            " actuators: {swing: a, boom: b}}",
+            "log.joystick.swing.scale: 0 makes every value the same",
+        ),
+        (
             "log: {time: {column: t, scale: 0}, joystick: {}, actuators: {}}",
             "log.time.scale: 0 is not greater than 0",
         ),
@@ -298,6 +303,13 @@ def test_unknown_actuator_of_a_linkage(load: Load) -> None:
     assert "arm.linkages[0].actuator: 'bom' is not an actuator; did you mean 'boom'?" in refusal(
         load, text
     )
+
+
+def test_impossible_drive_of_a_linkage(load: Load) -> None:
+    drive = "{type: cylinder, base_m: 1, rod_m: 0.1, length_at_zero_m: 1}"
+    linkage = f"  linkages:\n    - {{joint: a, actuator: boom, drive: {drive}}}\nscene:"
+    text = refusal(load, SITE.replace("scene:", linkage))
+    assert "arm.linkages[0].drive: at the upper limit 0.8 the cylinder is 1.8 m long" in text
 
 
 def test_all_problems_of_site_and_scene_come_at_once(load: Load, tmp_path: Path) -> None:
