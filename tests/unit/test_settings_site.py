@@ -258,8 +258,10 @@ def test_mistake_is_named_with_line_key_value_and_remedy(
         ("log: {time: {colum: t}, joystick: {}, actuators: {}}", "log.time.column: is missing"),
         ("log: {time: [t], joystick: {}, actuators: {}}", "log.time: a list of 1 is not text"),
         (
-            "log: {time: t, joystick: {swing: {column: a, scale: 0}, boom: b},"
-            " actuators: {swing: a, boom: b}}",
+            (
+                "log: {time: t, joystick: {swing: {column: a, scale: 0}, boom: b},"
+                " actuators: {swing: a, boom: b}}"
+            ),
             "log.joystick.swing.scale: 0 makes every value the same",
         ),
         (
