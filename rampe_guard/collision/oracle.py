@@ -13,9 +13,9 @@ import fcl
 import numpy as np
 
 from rampe_guard.collision.pieces import SKIN_M, fcl_bvh, fcl_convex
-from rampe_guard.core.convex import ConvexPiece, HalfspacePiece
+from rampe_guard.core.convex import HalfspacePiece
 from rampe_guard.core.kinematics import apply
-from rampe_guard.core.sweep_problem import Nearest
+from rampe_guard.core.sweep_problem import Nearest, Zone
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from rampe_guard.collision.mesh import TriangleMesh
     from rampe_guard.collision.zones import Solid
     from rampe_guard.core.convex import ObstaclePiece
+    from rampe_guard.core.scene import ActuatorLimit
+    from rampe_guard.core.sweep_problem import SweepProblem
     from rampe_guard.core.types import FloatArray, Point
 
 EXACT_ERROR_M = 1e-6
@@ -36,29 +38,23 @@ class FclOracle:
 
     def __init__(
         self,
+        problem: SweepProblem,
         meshes: Sequence[TriangleMesh | None],
-        links: Sequence[Sequence[ConvexPiece]],
-        zones: Sequence[tuple[ObstaclePiece, ...]],
         solids: Sequence[Solid | None],
     ) -> None:
-        """``solids`` and ``zones`` run alike; None and () for zones without a body."""
-        self._pieces = [
-            fcl.CollisionObject(fcl_convex(piece.vertices)) for own in links for piece in own
-        ]
-        self._obstacles = [_obstacle(piece) for own in zones for piece in own]
+        """``meshes``: one per link. ``solids``: one per zone, None for actuator limits."""
+        self._bodies = [fcl.CollisionObject(fcl_convex(body.vertices)) for body in problem.bodies]
+        self._obstacles = [_obstacle(piece) for piece in problem.obstacles]
         self._normals = [
             -piece.normal if isinstance(piece, HalfspacePiece) else None
-            for own in zones
-            for piece in own
+            for piece in problem.obstacles
         ]
-        self._planes = [
-            own[0] if own and isinstance(own[0], HalfspacePiece) else None for own in zones
-        ]
+        self._planes = [_plane(zone) for zone in problem.zones]
         self._solids = list(solids)
-        self._hulls = [
-            np.concatenate([piece.vertices for piece in own]) if own else np.zeros((0, 3))
-            for own in links
-        ]
+        self._hulls = {
+            int(link): body.vertices
+            for link, body in zip(problem.solid_links, problem.bodies, strict=False)
+        }
         self._surfaces = [None if m is None else fcl.CollisionObject(fcl_bvh(m)) for m in meshes]
         parts = [() if mesh is None else tuple(mesh.components()) for mesh in meshes]
         self._inner = [np.array([p.vertices[0] for p in own]).reshape(-1, 3) for own in parts]
@@ -66,13 +62,13 @@ class FclOracle:
         self._request = fcl.DistanceRequest(enable_nearest_points=True)
 
     def direction(
-        self, piece: int, obstacle: int, pose: FloatArray, *, swapped: bool
+        self, body: int, obstacle: int, pose: FloatArray, *, swapped: bool
     ) -> FloatArray | None:
-        """A guess of the unit direction from a link piece to an obstacle piece."""
+        """A guess of the unit direction from a body to an obstacle piece."""
         normal = self._normals[obstacle]
         if normal is not None:
             return normal
-        a, b = self._pieces[piece], self._obstacles[obstacle]
+        a, b = self._bodies[body], self._obstacles[obstacle]
         a.setTransform(fcl.Transform(pose[:3, :3], pose[:3, 3]))
         result = fcl.DistanceResult()
         if swapped:
@@ -139,6 +135,11 @@ class FclOracle:
 
 
 FAR_M = 1e7
+
+
+def _plane(zone: Zone | ActuatorLimit) -> HalfspacePiece | None:
+    first = zone.pieces[0] if isinstance(zone, Zone) else None
+    return first if isinstance(first, HalfspacePiece) else None
 
 
 def _obstacle(piece: ObstaclePiece) -> fcl.CollisionObject | None:

@@ -10,6 +10,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from rampe_guard.collision.mesh import IntArray, TriangleMesh
 from rampe_guard.core.convex import ConvexPiece, oriented_box
+from rampe_guard.core.sweep_problem import LinkBody
 
 if TYPE_CHECKING:
     from rampe_guard.core.types import FloatArray
@@ -21,6 +22,13 @@ INSIDE = 0.3
 """Winding number from which a point counts as inside a mesh that may be open."""
 EXCESS_TRIANGLES = 20_000
 """Above so many triangles the bulge of a hull is not measured but taken as its size."""
+
+
+def link_body(mesh: TriangleMesh, excess_m: float, most: int) -> LinkBody:
+    """A link's hull and, if that bulges, its pieces."""
+    (whole,) = convex_pieces(mesh, excess_m, 1)
+    pieces = convex_pieces(mesh, excess_m, most)
+    return LinkBody(whole, tuple(pieces) if len(pieces) > 1 else ())
 
 
 def convex_pieces(mesh: TriangleMesh, excess_m: float, most: int) -> list[ConvexPiece]:

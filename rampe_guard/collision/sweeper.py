@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rampe_guard.collision.oracle import FclOracle
-from rampe_guard.collision.pieces import convex_pieces
+from rampe_guard.collision.pieces import link_body
 from rampe_guard.collision.zones import Solid, build_zone
 from rampe_guard.core.config import SweepConfig
 from rampe_guard.core.scene import ActuatorLimit, Scene
@@ -48,12 +48,9 @@ class FclSweeper:
         self._config = SweepConfig() if config is None else config
         excess = 0.5 * self._config.clearance_tolerance_m
         links = [
-            [] if mesh is None else convex_pieces(mesh, excess, LINK_PIECES) for mesh in arm.meshes
+            None if mesh is None else link_body(mesh, excess, LINK_PIECES) for mesh in arm.meshes
         ]
-        points = [
-            np.concatenate([piece.vertices for piece in own]) if own else np.zeros((0, 3))
-            for own in links
-        ]
+        points = [np.zeros((0, 3)) if body is None else body.hull.vertices for body in links]
         motion = ArmMotion(arm.chain, arm.joints, points, arm.proven[:, 0], arm.proven[:, 1])
         zones: list[Zone | ActuatorLimit] = []
         solids: list[Solid | None] = []
@@ -65,9 +62,8 @@ class FclSweeper:
                 zone, solid = build_zone(item, arm.link_names)
                 zones.append(zone)
                 solids.append(solid)
-        bodies = [zone.pieces if isinstance(zone, Zone) else () for zone in zones]
         self._problem = SweepProblem(motion, arm.link_names, links, zones)
-        self._oracle = FclOracle(arm.meshes, links, bodies, solids)
+        self._oracle = FclOracle(self._problem, arm.meshes, solids)
 
     def sweep(
         self,

@@ -17,7 +17,8 @@ from rampe_guard.collision.mesh import (
     load_mesh,
     prism_mesh,
 )
-from rampe_guard.core.drive import actuator_value, check_monotone, domain
+from rampe_guard.core.drive import actuator_value, domain
+from rampe_guard.core.drive_proof import check_monotone
 from rampe_guard.core.kinematics import Chain, ForwardKinematics, JointMap
 from rampe_guard.errors import GeometryError
 

@@ -7,13 +7,15 @@ this is a lower bound of their distance, whoever proposed n: it needs no trust i
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 if TYPE_CHECKING:
     from rampe_guard.core.types import FloatArray
 
+IntArray: TypeAlias = npt.NDArray[np.intp]
 MAX_SPHERES = 8
 
 
@@ -116,22 +118,21 @@ def gaps(
 
 
 class CoarseBounds:
-    """Lower bounds of the distance between every link piece and every obstacle piece at once.
+    """Lower bounds of the distance between every body and every obstacle piece at once.
 
-    Link pieces are held by spheres, obstacle pieces by boxes rounded by their radius.
+    Bodies are held by spheres, obstacle pieces by boxes rounded by their radius.
     """
 
-    def __init__(self, links: list[list[ConvexPiece]], obstacles: list[ObstaclePiece]) -> None:
-        spheres = [[covering_spheres(piece) for piece in pieces] for pieces in links]
-        flat = [block for blocks in spheres for block in blocks]
-        stacked = np.concatenate(flat) if flat else np.zeros((0, 4))
+    def __init__(
+        self, bodies: list[ConvexPiece], links: IntArray, obstacles: list[ObstaclePiece]
+    ) -> None:
+        """``links``: index of the link that carries each body."""
+        spheres = [covering_spheres(body) for body in bodies]
+        stacked = np.concatenate(spheres)
         self._centers, self._radii = stacked[:, :3], stacked[:, 3]
-        sizes = [len(block) for block in flat]
+        sizes = [len(block) for block in spheres]
         self._starts = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.intp)
-        self._sphere_link = np.array(
-            [link for link, blocks in enumerate(spheres) for block in blocks for _ in block],
-            dtype=np.intp,
-        )
+        self._sphere_link = np.repeat(links, sizes)
         boxes = [_coarse_box(piece) for piece in obstacles]
         self._rotation = np.concatenate([rotation for _, rotation, _, _ in boxes], axis=1)
         self._center = np.array([rotation.T @ center for center, rotation, _, _ in boxes])
@@ -139,7 +140,7 @@ class CoarseBounds:
         self._radius = np.array([radius for _, _, _, radius in boxes])
 
     def __call__(self, rotations: FloatArray, translations: FloatArray) -> FloatArray:
-        """Bounds (k, link pieces, obstacle pieces) [m] at k poses of all links.
+        """Bounds (k, bodies, obstacle pieces) [m] at k poses of all links.
 
         Args:
             rotations: of all links (k, L, 3, 3).

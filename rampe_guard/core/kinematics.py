@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rampe_guard.core.drive import Drive, joint_value, slope_bounds
+from rampe_guard.core.drive import Drive, joint_scalar, joint_value
+from rampe_guard.core.drive_proof import slope_bounds
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -81,7 +82,7 @@ class ForwardKinematics:
         count = chain.joints
         self._first = np.zeros((count, 4, 4))
         self._second = np.zeros((count, 4, 4))
-        self._revolute = np.array(chain.revolute, dtype=bool)
+        self._turns = np.array(chain.revolute, dtype=bool)[:, None, None]
         for j in range(count):
             if chain.revolute[j]:
                 cross = np.zeros((4, 4))
@@ -104,15 +105,26 @@ class ForwardKinematics:
             (k, J + 1, 4, 4).
         """
         theta = np.asarray(joints, dtype=float)[:, :, None, None]
-        turn = self._revolute[:, None, None]
-        first = np.where(turn, np.sin(theta), theta)
-        second = np.where(turn, 1.0 - np.cos(theta), 0.0)
+        first = np.where(self._turns, np.sin(theta), theta)
+        second = np.where(self._turns, 1.0 - np.cos(theta), 0.0)
         local = self.chain.origin + first * self._first + second * self._second
         poses = np.empty((theta.shape[0], self.chain.joints + 1, 4, 4))
         poses[:, 0] = np.eye(4)
         for j, frame in enumerate(self.chain.parent):
             poses[:, j + 1] = poses[:, frame] @ local[:, j] if frame else local[:, j]
         return poses
+
+    def one(self, joints: FloatArray) -> FloatArray:
+        """Poses of all links (L, 4, 4) for a single θ (J,); `links` without the batch's cost."""
+        theta = joints[:, None, None]
+        first = np.where(self._turns, np.sin(theta), theta)
+        second = np.where(self._turns, 1.0 - np.cos(theta), 0.0)
+        local = self.chain.origin + first * self._first + second * self._second
+        poses = np.empty((self.chain.joints + 1, 4, 4))
+        poses[0] = np.eye(4)
+        for j, frame in enumerate(self.chain.parent):
+            np.dot(poses[frame], local[j], out=poses[j + 1])
+        return np.asarray(poses[self._frames] @ self.chain.link_origin)
 
     def links(self, joints: FloatArray) -> FloatArray:
         """Poses of all links in the world (k, L, 4, 4) for θ (k, J)."""
@@ -131,6 +143,10 @@ class JointMap:
     def value(self, actuator: FloatArray) -> FloatArray:
         """θ for an array of values of this actuator."""
         return self.multiplier * joint_value(self.drive, actuator) + self.offset
+
+    def scalar(self, q: float) -> float:
+        """θ for one value of this actuator."""
+        return self.multiplier * joint_scalar(self.drive, q) + self.offset
 
     def slopes(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Bounds of dθ/dq over each interval."""

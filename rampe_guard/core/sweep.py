@@ -106,15 +106,19 @@ def _by_distance(
         return []
     K = path.cells
     at = np.unique(np.linspace(0, K, min(COARSE_SAMPLES, K + 1)).round().astype(np.intp))
-    coarse = problem.coarse(path.rotations[at], path.translations[at])
-    moved = np.concatenate([np.zeros((1, path.motion.shape[1])), np.cumsum(path.motion, axis=0)])
-    way = np.diff(moved[at], axis=0)[:, problem.piece_link, None]
+    coarse = problem.coarse(
+        path.rotations[:, :, at].transpose(2, 1, 0, 3), path.translations[:, at].transpose(1, 0, 2)
+    )
+    moved = np.zeros((len(problem.solid_links), K + 1))
+    np.cumsum(path.motion[problem.solid_links], axis=1, out=moved[:, 1:])
+    way = np.diff(moved[:, at]).T[:, :, None]
     blocks = np.repeat(0.5 * (coarse[:-1] + coarse[1:] - way), np.diff(at), axis=0)
     blocks = np.moveaxis(blocks, 0, -1)
     zones = []
-    for index, (pieces, obstacles) in enumerate(problem.rows):
-        if len(pieces):
-            bounds = blocks[pieces, obstacles], coarse[0, pieces, obstacles]
+    for index, table in enumerate(problem.rows):
+        if table.hulls:
+            body, obstacle = table.body[: table.hulls], table.obstacle[: table.hulls]
+            bounds = blocks[body, obstacle], coarse[0, body, obstacle]
             zones.append((index, Rows(problem, index, path, oracle, budget, bounds)))
     return sorted(zones, key=lambda item: (float(item[1].bound.min()), item[0]))
 

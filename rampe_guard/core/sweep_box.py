@@ -20,7 +20,7 @@ from rampe_guard.core.types import AnyPath
 
 if TYPE_CHECKING:
     from rampe_guard.core.config import SweepConfig
-    from rampe_guard.core.sweep_problem import ClearanceOracle, SweepProblem
+    from rampe_guard.core.sweep_problem import ClearanceOracle, RowTable, SweepProblem
     from rampe_guard.core.types import FloatArray
 
 
@@ -82,20 +82,24 @@ def _box(
     reach = shares.sum(axis=0)
     pose = arm.link_poses(corners[1:2])
     coarse = problem.coarse(pose[..., :3, :3], pose[..., :3, 3])[0]
-    for index, (pieces, obstacles) in enumerate(problem.rows):
+    for index, table in enumerate(problem.rows):
         zone = problem.zones[index]
-        if not isinstance(zone, Zone) or not len(pieces):
+        if not isinstance(zone, Zone) or not table.hulls:
             continue
         near = zone.margin_m + config.tolerance_m
-        need = near + reach[problem.piece_link[pieces]]
-        doubtful = np.flatnonzero(coarse[pieces, obstacles] <= need)
+        need = near + reach[table.link]
+        bound = coarse[table.body[: table.hulls], table.obstacle[: table.hulls]]
+        doubtful = [int(row) for row in np.flatnonzero(bound <= need[: table.hulls])]
         cleared: set[int] = set()
-        for row in doubtful:
-            piece, obstacle = int(pieces[row]), int(obstacles[row])
-            link = int(problem.piece_link[piece])
+        while doubtful:
+            row = doubtful.pop()
+            link = int(table.link[row])
             if link in cleared:
                 continue
-            if _gap(problem, oracle, piece, obstacle, pose[0, link], budget) > need[row]:
+            if _gap(problem, oracle, table, row, pose[0, link], budget) > need[row]:
+                continue
+            if row < table.hulls and len(table.pieces[row]):
+                doubtful += [int(piece) for piece in table.pieces[row]]
                 continue
             budget.spend()
             distance = oracle.distance(link, index, pose[0, link]).distance_m
@@ -112,15 +116,16 @@ def _box(
 def _gap(
     problem: SweepProblem,
     oracle: ClearanceOracle,
-    piece: int,
-    obstacle: int,
+    table: RowTable,
+    row: int,
     pose: FloatArray,
     budget: Budget,
 ) -> float:
     budget.spend()
-    n = oracle.direction(piece, obstacle, pose, swapped=False)
+    body, obstacle = int(table.body[row]), int(table.obstacle[row])
+    n = oracle.direction(body, obstacle, pose, swapped=False)
     if n is None:
         return -np.inf
     low = lower_support(problem.obstacles[obstacle], n)
     rotation, translation = pose[None, :3, :3], pose[None, :3, 3]
-    return float(gaps(problem.vertices[piece], rotation, translation, n, low)[0])
+    return float(gaps(problem.vertices[body], rotation, translation, n, low)[0])

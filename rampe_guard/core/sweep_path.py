@@ -2,8 +2,8 @@
 
 For a piece of the path of length h (in path fraction) inside grid cell c, every point of link l
 
-* moves at most ``rate[c, l]`` · h, and
-* strays from the chord of its own way at most ``curvature[c, l]`` · h² / 8 + ``bend[c, l]`` · h,
+* moves at most ``rate[l, c]`` · h, and
+* strays from the chord of its own way at most ``curvature[l, c]`` · h² / 8 + ``bend[l, c]`` · h,
 
 where the first term is the turning of the joints (see kinematics) and the second the bending of
 the drives: a joint whose slope lies in [m, M] strays from its chord by at most (M - m)·h/4.
@@ -21,6 +21,7 @@ from rampe_guard.core.kinematics import Chain, ForwardKinematics, JointMap, moti
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from rampe_guard.core.convex import IntArray
     from rampe_guard.core.types import FloatArray
 
 LEVELS = 10
@@ -69,6 +70,12 @@ class ArmMotion:
     def link_poses(self, actuators: FloatArray) -> FloatArray:
         """World poses (k, L, 4, 4) of all links for actuator values (k, n)."""
         return self._kinematics.links(self.joint_values(actuators))
+
+    def link_poses_at(self, actuators: FloatArray) -> FloatArray:
+        """World poses (L, 4, 4) of all links for one set of actuator values (n,)."""
+        q = actuators.tolist()
+        theta = np.array([joint.scalar(q[joint.actuator]) for joint in self.joints])
+        return self._kinematics.one(theta)
 
     def slopes(self, q_a: FloatArray, q_b: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Bounds (k, J) of dθ/dq between actuator values (k, n), from dyadic tables."""
@@ -124,9 +131,10 @@ class SweptPath:
 
     Attributes:
         fractions: grid (K + 1,) from 0 to ``end``.
-        rotations: of all links (K + 2, L, 3, 3); translations: (K + 2, L, 3) [m].
-        rate, curvature, bend: per cell and link (K, L) [m], see the module.
-        motion, stray: both bounds over a whole cell (K, L) [m].
+        rotations: of all links (3, L, K + 2, 3): element [i, l, k, j] is R_ij.
+        translations: of all links (L, K + 2, 3) [m].
+        rate, curvature, bend: per link and cell (L, K) [m], see the module.
+        motion, stray: both bounds over a whole cell (L, K) [m].
     """
 
     arm: ArmMotion
@@ -149,13 +157,27 @@ class SweptPath:
         """K."""
         return len(self.fractions) - 1
 
+    def of_link(self, link: int) -> tuple[FloatArray, FloatArray]:
+        """Rotations (K + 2, 3, 3) and translations (K + 2, 3) of a link at all samples."""
+        return self.rotations[:, link].transpose(1, 0, 2), self.translations[link]
+
+    def project(self, n: FloatArray, links: IntArray) -> tuple[FloatArray, FloatArray]:
+        """A direction n in the frames of some links at all samples, and n·translation.
+
+        Returns:
+            (A, K + 2, 3) and (A, K + 2).
+        """
+        shape = self.rotations.shape[1:]
+        local = (n @ self.rotations.reshape(3, -1)).reshape(shape)
+        return local[links], (self.translations @ n)[links]
+
     def poses(self, fraction: float) -> FloatArray:
         """Poses (L, 4, 4) of all links at this fraction; remembered."""
         known = self._poses.get(fraction)
         if known is None:
             q = self.start + fraction * self.displacement
-            q = np.clip(q, self.arm.lower, self.arm.upper)[None]
-            known = self._poses[fraction] = self.arm.link_poses(q)[0]
+            q = np.minimum(np.maximum(q, self.arm.lower), self.arm.upper)
+            known = self._poses[fraction] = self.arm.link_poses_at(q)
         return known
 
 
@@ -200,12 +222,12 @@ def swept_path(
         end=end,
         fractions=fractions,
         probe=probe,
-        rotations=np.ascontiguousarray(poses[..., :3, :3]),
-        translations=np.ascontiguousarray(poses[..., :3, 3]),
-        rate=rate,
-        curvature=curvature,
-        bend=bend,
-        motion=rate * h,
-        stray=curvature * (h * h / 8.0) + bend * h,
+        rotations=np.ascontiguousarray(poses[..., :3, :3].transpose(2, 1, 0, 3)),
+        translations=np.ascontiguousarray(poses[..., :3, 3].transpose(1, 0, 2)),
+        rate=rate.T,
+        curvature=curvature.T,
+        bend=bend.T,
+        motion=rate.T * h,
+        stray=curvature.T * (h * h / 8.0) + bend.T * h,
         _poses={float(s): pose for s, pose in zip(fractions, poses, strict=False)},
     )

@@ -1,6 +1,6 @@
 """Proven distance bounds of one path against one zone, and the queries that sharpen them.
 
-Rows are pairs of convex pieces (of a link, of the zone), columns the cells of the path. Each
+Rows are pairs of convex shapes (of a link, of the zone), columns the cells of the path. Each
 entry holds a proven lower bound of the pair's distance anywhere in the cell. Bounds start
 coarse; each query gives a separating direction, and the support gap along that direction at all
 samples sharpens the whole row at once: between two samples a link point strays from its chord by
@@ -20,6 +20,7 @@ from rampe_guard.core.convex import gaps, lower_support
 from rampe_guard.core.sweep_problem import Nearest
 
 if TYPE_CHECKING:
+    from rampe_guard.core.convex import IntArray
     from rampe_guard.core.sweep_path import SweptPath
     from rampe_guard.core.sweep_problem import ClearanceOracle, SweepProblem
     from rampe_guard.core.types import FloatArray
@@ -50,6 +51,9 @@ class Budget:
 class Rows:
     """Bounds of one zone's rows.
 
+    Rows of pieces are asleep, with infinite bounds, until `replace` wakes them in the place of
+    their hull's row.
+
     Attributes:
         bound: proven distance per row and cell (P, K) [m].
         doubt: the same, but infinite where the cell has been cleared by walking through it.
@@ -57,7 +61,7 @@ class Rows:
         probe: per row the gap at the start and after the small first step (P, 2) [m], or NaN.
         tried: samples of each row that have been queried (P, K + 1).
         link: link of each row (P,).
-        excess: how far the pieces of each row bulge beyond their surfaces, about (P,) [m].
+        excess: how far the shapes of each row bulge beyond their surfaces, about (P,) [m].
     """
 
     def __init__(
@@ -69,46 +73,77 @@ class Rows:
         budget: Budget,
         coarse: tuple[FloatArray, FloatArray],
     ) -> None:
-        """``coarse``: bounds per row and cell (P, K), and per row at the start (P,) [m]."""
+        """``coarse``: bounds of hull rows per cell (H, K), and at the start (H,) [m]."""
         self.path = path
         self._problem, self._zone, self._oracle, self._budget = problem, zone, oracle, budget
-        self._piece, self._obstacle = problem.rows[zone]
-        self.link = problem.piece_link[self._piece]
-        self.excess = problem.piece_excess[self._piece] + problem.obstacle_excess[self._obstacle]
-        self.bound = np.maximum(coarse[0], 0.0)
+        self._table = table = problem.rows[zone]
+        self.link, self.excess = table.link, table.excess
+        count = len(self.link)
+        self.bound = np.full((count, path.cells), np.inf)
+        self.start = np.full(count, np.inf)
+        np.maximum(coarse[0], 0.0, out=self.bound[: table.hulls])
+        np.maximum(coarse[1], 0.0, out=self.start[: table.hulls])
         self.doubt = self.bound.copy()
-        self.start = np.maximum(coarse[1], 0.0)
-        self.tried = np.zeros((len(self.link), path.cells + 1), dtype=bool)
-        self.probe = np.full((len(self.link), 2), np.nan)
+        self.tried = np.zeros((count, path.cells + 1), dtype=bool)
+        self.probe = np.full((count, 2), np.nan)
         self._exact: dict[tuple[int, float], Nearest] = {}
 
-    def __len__(self) -> int:
-        return len(self.link)
-
     def query(self, row: int, sample: int) -> float:
-        """Sharpen a row with a direction found at one sample; its gap there [m], or -inf."""
+        """Sharpen bounds with a direction found at one sample; the row's gap there [m], or -inf.
+
+        For a hull the direction is tried on all hulls of the arm: links are often on one side.
+        """
         self.tried[row, sample] = True
-        path, link = self.path, self.link[row]
+        pose = self.path.poses(float(self.path.fractions[sample]))[self.link[row]]
         best = -np.inf
         for swapped in (False, True):
-            n, low, vertices = self._direction(
-                row, path.poses(float(path.fractions[sample]))[link], swapped=swapped
-            )
+            n, low, vertices = self._direction(row, pose, swapped=swapped)
             if n is None:
                 break
-            g = gaps(vertices, path.rotations[:, link], path.translations[:, link], n, low)
-            a, b = g[:-2], g[1:-1]
-            cell = np.minimum(a, b) - path.stray[:, link]
-            np.maximum(cell, 0.5 * (a + b - path.motion[:, link]), out=cell)
-            np.maximum(self.bound[row], cell, out=self.bound[row])
-            np.maximum(self.doubt[row], cell, out=self.doubt[row])
-            self.start[row] = max(self.start[row], g[0])
-            if sample == 0 and g[0] > best:
-                self.probe[row] = g[0], g[-1]
-            best = max(best, float(g[sample]))
+            if row < self._table.hulls:
+                rows = self._table.of_obstacle[int(self._table.obstacle[row])]
+                g = self._gaps_of_hulls(n, low)
+                mine = int(np.searchsorted(rows, row))
+            else:
+                link = self.link[row]
+                rotations, translations = self.path.of_link(link)
+                rows = np.array([row])
+                g = gaps(vertices, rotations, translations, n, low)[None]
+                mine = 0
+            self._raise(rows, g)
+            if sample == 0 and g[mine, 0] > best:
+                self.probe[row] = g[mine, 0], g[mine, -1]
+            best = max(best, float(g[mine, sample]))
             if best > 0.0:
                 break
         return best
+
+    def _gaps_of_hulls(self, n: FloatArray, low: float) -> FloatArray:
+        """gap(n) of all hulls that may not touch this zone (A, K + 2) [m]."""
+        problem, path = self._problem, self.path
+        local, along = path.project(n, problem.solid_links)
+        support = (local @ problem.hull_vertices).max(axis=2)
+        return np.asarray((low - support - along)[self._table.solid])
+
+    def _raise(self, rows: IntArray, g: FloatArray) -> None:
+        """Use gaps (A, K + 2) along one direction to raise the bounds of rows (A,)."""
+        path, link = self.path, self.link[rows]
+        a, b = g[:, :-2], g[:, 1:-1]
+        cell = np.minimum(a, b) - path.stray[link]
+        np.maximum(cell, 0.5 * (a + b - path.motion[link]), out=cell)
+        self.bound[rows] = np.maximum(self.bound[rows], cell)
+        self.doubt[rows] = np.maximum(self.doubt[rows], cell)
+        self.start[rows] = np.maximum(self.start[rows], g[:, 0])
+
+    def replace(self, row: int) -> bool:
+        """Put the rows of its link's pieces in the place of a hull's row; False if it has none."""
+        if row >= self._table.hulls or not len(self._table.pieces[row]):
+            return False
+        pieces = self._table.pieces[row]
+        for bounds in (self.bound, self.doubt, self.start):
+            bounds[pieces] = bounds[row]
+            bounds[row] = np.inf
+        return True
 
     def distance(self, link: int, fraction: float) -> Nearest:
         """Exact distance of a link, remembered; at the start it tells inside from outside too."""
@@ -141,10 +176,10 @@ class Rows:
         room = gap - target
         if not room > 0.0:
             return 0.0
-        linear = ratio(room, float(path.rate[cell, link]))
+        linear = ratio(room, float(path.rate[link, cell]))
         if linear >= rest:
             return rest
-        curvature, bend = float(path.curvature[cell, link]), float(path.bend[cell, link])
+        curvature, bend = float(path.curvature[link, cell]), float(path.bend[link, cell])
         # the longest h whose stray takes half of the room
         h = ratio(room, bend + float(np.sqrt(bend * bend + 0.25 * curvature * room)))
         h = min(rest, max(h, linear))
@@ -159,11 +194,11 @@ class Rows:
     def _direction(
         self, row: int, pose: FloatArray, *, swapped: bool
     ) -> tuple[FloatArray | None, float, FloatArray]:
-        """A direction, the zone's support in it, and the link piece's vertices (3, v)."""
+        """A direction, the zone's support in it, and the body's vertices (3, v)."""
         self._budget.spend()
-        piece, obstacle = int(self._piece[row]), int(self._obstacle[row])
-        vertices = self._problem.vertices[piece]
-        n = self._oracle.direction(piece, obstacle, pose, swapped=swapped)
+        body, obstacle = int(self._table.body[row]), int(self._table.obstacle[row])
+        vertices = self._problem.vertices[body]
+        n = self._oracle.direction(body, obstacle, pose, swapped=swapped)
         if n is None:
             return None, -np.inf, vertices
         return n, lower_support(self._problem.obstacles[obstacle], n), vertices

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 NOISE_M = 1e-6
 """Smaller changes of a distance than this are no motion [m]."""
-SHARP_M = 1e-3
-"""A piece that bulges less than this stands for its surface when asked which way it moves [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +44,7 @@ class ZoneSearch:
         self._near = zone.margin_m + config.tolerance_m
         # What stays proven while stepping: a little more than the margin, so that steps end.
         self._target = zone.margin_m + 0.5 * config.tolerance_m
-        self._slack = config.clearance_tolerance_m
+        self._slack, self._fine = config.clearance_tolerance_m, config.tolerance_m
         self._least = np.inf
         """Least distance seen at any sample, about [m]: it says when a bound is sharp."""
         self._link_now = int(rows.link[np.argmin(rows.start)])
@@ -71,24 +69,31 @@ class ZoneSearch:
     # --- the start -------------------------------------------------------------------------
 
     def _clearance_now(self) -> None:
-        """Raise the bounds at the start until the least is within the tolerance of the truth."""
+        """Raise the bounds at the start until the least is within the tolerance of the truth.
+
+        Near the margin that is the tolerance of a contact: whether the arm is inside decides.
+        """
         rows = self._rows
         while True:
             row = int(np.argmin(rows.start))
             link = self._link_now = int(rows.link[row])
-            if rows.start[row] >= self._least - self._slack:
+            slack = self._slack if self._least > self._near + self._slack else self._fine
+            if rows.start[row] >= self._least - slack:
                 return
             if not rows.tried[row, 0]:
                 gap = rows.query(row, 0)
-                if gap > self._near and rows.excess[row] <= self._slack:
+                if gap > self._near:
                     self._least = min(self._least, gap + float(rows.excess[row]))
-            elif not rows.knows_start(link):
+            elif not rows.replace(row):
+                if rows.knows_start(link):
+                    return
                 distance = rows.distance(link, 0.0).distance_m
                 self._least = min(self._least, distance)
-                mine = rows.link == link
-                rows.start[mine] = np.maximum(rows.start[mine], distance)
-            else:
-                return
+                self._raise_start(link, distance)
+
+    def _raise_start(self, link: int, distance: float) -> None:
+        mine = self._rows.link == link
+        self._rows.start[mine] = np.maximum(self._rows.start[mine], distance)
 
     def _closing(self) -> bool:
         """Does a link inside the margin, or else the nearest one, come nearer at the start?"""
@@ -104,11 +109,14 @@ class ZoneSearch:
 
     def _approaches(self, link: int, *, exact: bool) -> bool:
         rows = self._rows
-        mine = np.flatnonzero(rows.link == link)
-        nearest = mine[np.argmin(rows.start[mine])]
-        before, after = (float(gap) for gap in rows.probe[nearest])
-        if before > 0.0 and (not exact or rows.excess[nearest] <= SHARP_M):
-            return after < before - NOISE_M
+        if not exact and not rows.knows_start(link):
+            mine = np.flatnonzero(rows.link == link)
+            nearest = int(mine[np.argmin(rows.start[mine])])
+            if not rows.tried[nearest, 0]:
+                rows.query(nearest, 0)
+            before, after = (float(gap) for gap in rows.probe[nearest])
+            if before > 0.0:
+                return after < before - NOISE_M
         before = rows.distance(link, 0.0).distance_m
         after = rows.distance(link, self._path.probe).distance_m
         if before == after == 0.0:
@@ -129,7 +137,7 @@ class ZoneSearch:
                     rows.query(row, cell)
                 elif not rows.tried[row, cell + 1]:
                     rows.query(row, cell + 1)
-                else:
+                elif not rows.replace(row):
                     self._walk(int(rows.link[row]), cell)
 
     def _walk(self, link: int, cell: int) -> None:
@@ -144,13 +152,13 @@ class ZoneSearch:
             rest = end - s
             steps = [rows.step(row, cell, s, rest, self._target) for row in doubtful]
             step = min(steps)
-            if step <= 0.0 or step * self._path.rate[cell, link] < self._near - self._target:
+            if step <= 0.0 or step * self._path.rate[link, cell] < self._near - self._target:
                 nearest = rows.distance(link, s)
                 if nearest.distance_m <= self._near:
                     self._touch = _Touch(s, link, nearest.point_m)
                     break
                 room = nearest.distance_m - self._target
-                step = max(step, ratio(room, float(self._path.rate[cell, link])))
+                step = max(step, ratio(room, float(self._path.rate[link, cell])))
             else:
                 doubtful = [row for row, own in zip(doubtful, steps, strict=True) if own < rest]
             if step >= rest:
@@ -168,12 +176,12 @@ class ZoneSearch:
             if rows.bound[row, cell] >= self._least - self._slack:
                 return
             sample = cell if not rows.tried[row, cell] else cell + 1
-            if rows.tried[row, sample]:
-                self._sharpen(int(rows.link[row]), cell)
-            else:
+            if not rows.tried[row, sample]:
                 gap = rows.query(row, sample)
-                if gap > 0.0 and rows.excess[row] <= self._slack:
+                if gap > 0.0:
                     self._least = min(self._least, gap + float(rows.excess[row]))
+            elif not rows.replace(row):
+                self._sharpen(int(rows.link[row]), cell)
 
     def _sharpen(self, link: int, cell: int) -> None:
         """Prove that a link stays farther than the least distance seen less the tolerance.
@@ -190,7 +198,7 @@ class ZoneSearch:
             level = self._least - self._slack
             if level <= self._zone.margin_m:
                 return  # that much is proven already
-            s += ratio(distance - level, float(self._path.rate[cell, link]))
+            s += ratio(distance - level, float(self._path.rate[link, cell]))
         rows.bound[mine, cell] = np.maximum(rows.bound[mine, cell], level)
 
     def _ends(self, cell: int) -> tuple[float, float]:
@@ -215,6 +223,7 @@ class ZoneSearch:
                 clearance_m=0.0,
                 clearance_now_m=now,
                 closing=closing,
+                margin_m=margin,
             )
         return ZoneSweep(
             zone=self._zone.name,
@@ -225,6 +234,7 @@ class ZoneSearch:
             clearance_m=max(least - margin, 0.0) if proven else None,
             clearance_now_m=now,
             closing=closing,
+            margin_m=margin,
         )
 
     def _doubtful(self) -> float:
