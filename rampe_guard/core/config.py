@@ -50,10 +50,10 @@ class PriorConfig:
         slope_weight: how many it is worth that displacement does not depend on position.
     """
 
-    displacement: float = 0.2
-    spread: float = 0.15
-    weight: float = 1.0
-    slope_weight: float = 1.0
+    displacement: float = 0.15
+    spread: float = 0.07
+    weight: float = 0.5
+    slope_weight: float = 0.5
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,300 @@
+"""`Guard.step` on a one-joint machine with zones in closed form, so every fraction is known."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from rampe_guard.core.alarm import Level, State
+from rampe_guard.core.config import ActuatorConfig, GuardConfig, InputConfig, RampeConfig
+from rampe_guard.core.events import SYSTEM_ZONE, AlertEvent, Event, PredictionEvent
+from rampe_guard.core.guard import Guard
+from rampe_guard.core.monitor import Status
+from rampe_guard.core.types import (
+    ActuatorSample,
+    Certificate,
+    FloatArray,
+    Inputs,
+    JoystickSample,
+    SweepResult,
+    ZoneSweep,
+)
+
+DT = 0.02
+ACTUATORS = (ActuatorConfig("swing", 0, 1, 1.0, 2.0, 0.1, 0.1, "rad"),)
+CONFIG = GuardConfig(ACTUATORS, axes=1, rampe=RampeConfig(n_init=3))
+LIMITS = np.array([[-2.0, 2.0]])
+
+
+@dataclass
+class Wall:
+    """Everything beyond ``at`` is solid; the margin is 0.1."""
+
+    at: float = 1.1
+    answer: Certificate | None = None
+
+    def sweep(
+        self, start: FloatArray, displacement: FloatArray, *, any_path: bool = False
+    ) -> SweepResult:
+        """Closed form."""
+        assert not any_path
+        edge = self.at - 0.1
+        now, way = edge - float(start[0]), float(displacement[0])
+        fraction = 0.0 if now <= 0 else now / way if way >= now > 0 else None
+        kind = Certificate.FREE if fraction is None else Certificate.CONTACT
+        near = max(now - max(way, 0.0), 0.0)
+        zone = ZoneSweep("wall", kind, fraction, "arm", None, near, now, way > 0, 0.1)
+        if self.answer is not None:
+            zone = replace(zone, certificate=self.answer, contact_fraction=None, clearance_m=None)
+        return SweepResult((zone,))
+
+
+class Rig:
+    """Drives a guard with a machine that follows its lever exactly."""
+
+    def __init__(self, wall: Wall | None = None, config: GuardConfig = CONFIG) -> None:
+        self.guard = Guard(config, LIMITS, wall or Wall(), start_s=0.0)
+        self.q, self.now = 0.0, 0.0
+        self.events: list[Event] = []
+        self.trace: list[tuple[float, float]] = []
+
+    def tick(self, lever: float | None, *, arm: bool = True, speed: float | None = None) -> None:
+        self.now += DT
+        self.q += (speed if speed is not None else (lever or 0.0)) * DT
+        sticks: tuple[JoystickSample, ...] = ()
+        if lever is not None:
+            sticks = (JoystickSample(self.now, np.array([lever]), self.now),)
+        arms: tuple[ActuatorSample, ...] = ()
+        if arm:
+            arms = (ActuatorSample(self.now, np.array([self.q]), None, self.now),)
+        self.events += self.guard.step(Inputs(sticks, arms), self.now)
+        self.trace.append((self.now, self.q))
+
+    def hold(self, lever: float | None, seconds: float, *, arm: bool = True) -> None:
+        for _ in range(round(seconds / DT)):
+            self.tick(lever, arm=arm)
+
+    def alerts(self, zone: str = "wall", kind: str = "transition") -> list[AlertEvent]:
+        return [
+            e
+            for e in self.events
+            if isinstance(e, AlertEvent) and e.zone == zone and e.kind == kind
+        ]
+
+    def predictions(self, event: str) -> list[PredictionEvent]:
+        return [e for e in self.events if isinstance(e, PredictionEvent) and e.event == event]
+
+    def strokes(self, count: int, length: float = 0.8) -> None:
+        """Swing out and back ``count`` times."""
+        for _ in range(count):
+            self.hold(0.5, length / 0.5)
+            self.hold(0.0, 0.3)
+            self.hold(-0.5, length / 0.5)
+            self.hold(0.0, 0.3)
+            self.q = 0.0
+
+
+def first(times: Iterable[float]) -> float:
+    return next(iter(times))
+
+
+def test_an_unknown_operator_is_warned_before_the_wall() -> None:
+    rig = Rig()
+    rig.hold(0.0, 0.5)
+    rig.hold(0.8, 2.0)
+    raised = rig.alerts()[0]
+    entered = first(t for t, q in rig.trace if q >= 1.0)
+    assert (raised.level, raised.evidence.source) == (Level.IMMINENT, "stopping")
+    assert entered - raised.now_s > 0.3
+    assert raised.evidence.time_to_collision_s == pytest.approx(entered - raised.now_s, abs=0.1)
+
+
+def test_a_known_operator_is_warned_earlier() -> None:
+    rig = Rig()
+    rig.strokes(4, length=1.2)
+    rig.events.clear()
+    rig.hold(0.5, 2.4)
+    entered = first(t for t, q in reversed(rig.trace) if q < 1.0)
+    raised = rig.alerts()[0]
+    assert raised.evidence.source == "intent"
+    assert raised.level in {Level.CAUTION, Level.WARNING}
+    assert entered - raised.now_s > 1.0
+    assert raised.prediction is not None
+    assert raised.prediction.occurrences >= 4
+    assert [a.level for a in rig.alerts()][-1] is Level.IMMINENT
+
+
+def test_an_operator_who_stops_short_is_left_in_peace() -> None:
+    rig = Rig()
+    rig.strokes(6, length=0.6)
+    assert rig.alerts() == []
+
+
+def test_backing_out_is_never_alarmed_and_ends_the_alert() -> None:
+    rig = Rig()
+    rig.hold(0.0, 0.5)
+    rig.hold(0.8, 1.4)  # into the margin
+    assert rig.alerts()[-1].level is Level.IMMINENT
+    rig.hold(0.0, 1.5)
+    assert rig.alerts()[-1].level is Level.CLEAR
+    rig.events.clear()
+    rig.hold(-0.8, 1.0)
+    assert rig.alerts() == []
+
+
+def test_primitives_are_learned_and_told() -> None:
+    rig = Rig()
+    rig.strokes(4)
+    assert rig.guard.rampe.categories == {(1,): 4, (-1,): 4}
+    started, ended = rig.predictions("started"), rig.predictions("ended")
+    assert [e.prediction.category for e in ended[:2]] == [(1,), (-1,)]
+    assert all(e.learned for e in ended)
+    np.testing.assert_allclose(ended[0].prediction.progress, [0.8], atol=0.05)
+    assert started[0].prediction.mean is None
+    known = started[-1].prediction.mean
+    assert known is not None
+    np.testing.assert_allclose(known, [-0.8], atol=0.2)
+    assert rig.predictions("updated")
+
+
+def test_the_same_inputs_give_the_same_events() -> None:
+    def run() -> str:
+        rig = Rig()
+        rig.strokes(3, 1.2)
+        rig.hold(0.8, 2.0)
+        rig.hold(None, 1.0, arm=False)
+        return repr(rig.events)
+
+    assert run() == run()
+
+
+@pytest.mark.parametrize(
+    ("silence", "code"),
+    [
+        (lambda rig: rig.hold(None, 1.0), "joystick_silent"),
+        (lambda rig: rig.hold(0.8, 1.0, arm=False), "actuators_silent"),
+    ],
+)
+def test_silence_freezes_alerts_and_says_so(silence: Callable[[Rig], None], code: str) -> None:
+    rig = Rig()
+    rig.hold(0.0, 0.5)
+    rig.hold(0.8, 1.1)
+    (before,) = rig.alerts()
+    rig.events.clear()
+    silence(rig)
+    health = rig.guard.snapshot(rig.now).health
+    assert health.status is Status.NOT_MONITORING
+    assert code in [r.code for r in health.reasons]
+    assert rig.alerts() == []
+    repeats = rig.alerts(kind="repeat")
+    assert repeats[-1].quality == "stale"
+    assert repeats[-1].level is before.level
+    (system,) = rig.alerts(SYSTEM_ZONE)
+    assert (system.level, system.evidence.source) == (Level.WARNING, "system")
+    rig.hold(0.0, 3.0)
+    assert rig.guard.snapshot(rig.now).health.status is Status.OK
+    assert rig.alerts(SYSTEM_ZONE)[-1].state is State.RTN_UNACKED
+    assert rig.alerts()[-1].quality == "good"
+
+
+def test_a_primitive_with_a_gap_is_not_learned() -> None:
+    rig = Rig()
+    rig.hold(0.0, 0.3)
+    rig.hold(0.5, 0.4)
+    rig.hold(None, 1.0, arm=False)
+    rig.hold(0.5, 0.2)
+    rig.hold(0.0, 0.3)
+    assert rig.guard.rampe.categories == {}
+    assert [e.learned for e in rig.predictions("ended")] == [False]
+
+
+def test_refused_messages_are_counted_and_taint_the_primitive() -> None:
+    rig = Rig()
+    rig.hold(0.0, 0.3)
+    rig.hold(0.5, 0.2)
+    rig.tick(7.0, speed=0.5)
+    rig.guard.step(Inputs(rejected=(("actuators", "bad_json"),)), rig.now)
+    rig.hold(0.5, 0.2)
+    rig.hold(0.0, 0.3)
+    health = rig.guard.snapshot(rig.now).health
+    assert health.rejected == {
+        ("joystick", "axis_out_of_range"): 1,
+        ("actuators", "bad_json"): 1,
+    }
+    assert health.status is Status.DEGRADED
+    assert rig.guard.rampe.categories == {}
+
+
+@pytest.mark.parametrize("answer", [Certificate.UNKNOWN])
+def test_a_sweep_without_an_answer_never_reads_as_clear(answer: Certificate) -> None:
+    rig = Rig(Wall(answer=answer))
+    rig.hold(0.0, 0.3)
+    (raised,) = rig.alerts()
+    assert raised.level is Level.IMMINENT
+    assert raised.quality == "degraded"
+    assert "sweep_unknown" in [r.code for r in rig.guard.snapshot(rig.now).health.reasons]
+
+
+def test_active_alerts_are_repeated_at_5_hz() -> None:
+    rig = Rig()
+    rig.hold(0.0, 0.5)
+    rig.hold(0.8, 1.4)
+    raised = rig.alerts()[0].now_s
+    told = [
+        e.now_s
+        for e in rig.events
+        if isinstance(e, AlertEvent) and e.zone == "wall" and e.now_s >= raised
+    ]
+    gaps = np.diff([*told, rig.now])
+    assert gaps.max() <= 0.2 + DT
+    assert [e.seq for e in rig.events if isinstance(e, AlertEvent)] == list(range(1, len(told) + 1))
+
+
+def test_touching_latches_until_someone_has_seen_it() -> None:
+    rig = Rig()
+    rig.hold(0.0, 0.5)
+    rig.hold(0.8, 1.8)  # through the margin and into the wall itself
+    rig.hold(-0.8, 2.5)
+    last = rig.alerts()[-1]
+    assert (last.level, last.state) == (Level.CLEAR, State.RTN_UNACKED)
+    assert rig.guard.acknowledge("nobody.knows.1", "ann", rig.now) == ()
+    (seen,) = rig.guard.acknowledge(last.alert_id, "ann", rig.now)
+    assert isinstance(seen, AlertEvent)
+    assert (seen.state, seen.acked_by) == (State.NORMAL, "ann")
+
+
+def test_a_restarted_sender_is_followed_again_and_old_models_stay() -> None:
+    rig = Rig()
+    rig.strokes(3)
+    learned = dict(rig.guard.rampe.categories)
+    shift = 1000.0
+    for k in range(80):
+        now = rig.now + 0.02 * (k + 1)
+        stick = JoystickSample(now + shift, np.array([0.0]), now)
+        arm = ActuatorSample(now + shift, np.array([0.0]), None, now)
+        rig.guard.step(Inputs((stick,), (arm,)), now)
+        rig_now = now
+    health = rig.guard.snapshot(rig_now).health
+    assert health.rejected[("actuators", "stamp_jump")] >= 20
+    assert health.status is Status.DEGRADED
+    assert rig.guard.rampe.categories == learned
+
+
+def test_snapshot_before_any_data() -> None:
+    snapshot = Rig().guard.snapshot(0.1)
+    assert snapshot.position is None
+    assert snapshot.alerts == ()
+    assert snapshot.prediction is None
+
+
+def test_an_on_change_lever_needs_no_repetition() -> None:
+    config = replace(CONFIG, inputs=InputConfig(joystick_on_change=True))
+    rig = Rig(config=config)
+    rig.tick(0.0)
+    rig.hold(None, 2.0)
+    rig.tick(0.8)
+    for _ in range(60):
+        rig.tick(None, speed=0.8)
+    assert rig.guard.snapshot(rig.now).health.status is Status.OK
+    assert rig.alerts()[0].level is Level.IMMINENT
