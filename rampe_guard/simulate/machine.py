@@ -64,7 +64,7 @@ class MachineState:
 
 def build_machine(
     actuators: Sequence[ActuatorConfig],
-    limits: Sequence[tuple[float | None, float | None]],
+    limits: Sequence[tuple[float | None, float | None]] | FloatArray,
     *,
     time_constant_s: float = 0.06,
 ) -> Machine:
@@ -72,7 +72,7 @@ def build_machine(
 
     Args:
         actuators: n actuators.
-        limits: n pairs (lower, upper) [unit]; None = no end stop on that side.
+        limits: n pairs (lower, upper) [unit]; None or infinite = no end stop on that side.
         time_constant_s: of the drives [s].
 
     Returns:

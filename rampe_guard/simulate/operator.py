@@ -52,7 +52,8 @@ class Operator:
         check_waypoints(waypoints, self._names)
         self._waypoints = tuple(waypoints)
         self._habits = habits or Habits()
-        self._rng = np.random.default_rng(seed)
+        # Two streams: what he plans must not depend on how often his levers are read.
+        self._rng, self._hand = np.random.default_rng(seed).spawn(2)
         n = len(actuators)
         self._speed = np.array([a.max_velocity for a in actuators])
         self._lag_s = np.array([a.lag_s for a in actuators])
@@ -137,7 +138,7 @@ class Operator:
     def _axes_of(self, dt_s: float) -> FloatArray:
         # A hand trembles slowly (0.2 s) and in proportion to the push; a free lever is still.
         keep = float(np.exp(-dt_s / 0.2))
-        fresh = self._rng.normal(0.0, self._habits.lever_noise, self._lever.shape)
+        fresh = self._hand.normal(0.0, self._habits.lever_noise, self._lever.shape)
         self._tremor = keep * self._tremor + np.sqrt(1.0 - keep**2) * fresh
         axes = np.zeros(max(self._axes) + 1)
         axes[self._axes] = self._signs * np.clip(self._lever * (1.0 + self._tremor), -1.0, 1.0)

@@ -18,18 +18,19 @@ from rampe_guard.simulate.operator import Operator
 from rampe_guard.simulate.work import Habits, Move, Overshoot, Waypoint
 
 ACTUATORS = ("swing", "boom", "stick", "bucket")
-START: FloatArray = np.array([0.0, 0.52, 0.20, 0.20])
-"""Over the trench, arm stretched, bucket open."""
+START: FloatArray = np.array([0.0, 0.70, 0.20, 0.20])
+"""Above the trench, arm stretched, bucket open."""
 
 CYCLE = (
     Waypoint(
-        "dig and lift",
+        "dig",
         (
-            Move("stick", 0.40, 0.02),
-            Move("bucket", 0.56, 0.03, start_s=0.1),
-            Move("boom", 0.80, 0.015, start_s=0.4),
+            Move("boom", 0.60, 0.012),
+            Move("stick", 0.38, 0.02, start_s=0.15),
+            Move("bucket", 0.52, 0.03, start_s=0.25),
         ),
     ),
+    Waypoint("lift", (Move("boom", 0.79, 0.015),)),
     Waypoint(
         "swing to heap",
         (Move("swing", 1.20, 0.02), Move("boom", 0.88, 0.015)),
@@ -41,9 +42,9 @@ CYCLE = (
         (
             Move("swing", 0.0, 0.02),
             Move("stick", 0.20, 0.02, start_s=0.1),
-            Move("boom", 0.52, 0.015, start_s=0.8),
+            Move("boom", 0.70, 0.015, start_s=0.8),
         ),
-        overshoot=Overshoot("boom", 0.62, 0.67),
+        overshoot=Overshoot("boom", 0.44, 0.49),
     ),
 )
 
@@ -64,4 +65,11 @@ def quarry_operator(
     names = tuple(a.name for a in actuators)
     if names != ACTUATORS:
         raise ValueError(f"the quarry needs a machine with {ACTUATORS}, not {names}")
-    return Operator(actuators, CYCLE, seed, Habits(overshoot_probability=overshoot_probability))
+    return Operator(
+        actuators,
+        CYCLE,
+        seed,
+        Habits(
+            vigour=(0.9, 1.0), foresight=(0.9, 1.1), overshoot_probability=overshoot_probability
+        ),
+    )

@@ -78,6 +78,15 @@ def test_the_same_seed_is_the_same_day() -> None:
     assert not np.array_equal(first[100].axes, other[100].axes)
 
 
+def test_his_plans_do_not_depend_on_the_rate() -> None:
+    slips = []
+    for rate_hz in (20.0, 50.0):
+        operator = Operator(ACTUATORS, WORK, 5, Habits(overshoot_probability=0.5))
+        run = simulate(ACTUATORS, operator, MACHINE, START, rate_hz=rate_hz, cycles=4)
+        slips.append([operator.overshoots for _ in run][-1])
+    assert slips[0] == slips[1] > 0
+
+
 def test_levers_keep_their_range_their_axis_and_their_sign() -> None:
     ticks, phases, _ = work(NEVER, 2)
     axes = np.array([tick.axes for tick in ticks])
