@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 PRISM_EXCESS_M = 1e-4
 """How far the prism round a cylinder may bulge [m]; it is part of a contact's tolerance."""
 MAX_PRISM_SIDES = 720
-MESH_PIECES = 32
+MESH_PIECES = 64
 MESH_EXCESS_M = 0.02
 
 
