@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from rampe_guard.assembly import load_machine
 from rampe_guard.core.types import Certificate, FloatArray, SweepResult, ZoneSweep
 from rampe_guard.evaluate.referee import Referee
+from rampe_guard.settings import load_site
 
 
 class WallAtOne:
@@ -83,3 +87,15 @@ def test_unfit_samples_are_refused() -> None:
         referee.feed(0.1, np.array([0.2]))
     with pytest.raises(ValueError, match="finite"):
         referee.feed(0.2, np.array([np.nan]))
+
+
+def test_on_the_demo_machine_a_swing_too_far_is_a_contact_with_the_wall() -> None:
+    site = load_site(Path(__file__).parents[2] / "config" / "sites" / "demo.yaml")
+    referee = Referee(load_machine(site).sweeper)
+    for i, swing in enumerate([1.2, 1.35, 1.5, 1.65, 1.5, 1.35]):
+        referee.feed(i * 0.2, np.array([swing, 0.88, 0.38, 0.52]))
+    (contact,) = referee.contacts
+    assert contact.zone == "wall"
+    assert not contact.unknown
+    assert 0.4 < contact.entered_s < 0.6
+    assert contact.left_s == pytest.approx(0.8)
