@@ -116,7 +116,7 @@ def _parser() -> argparse.ArgumentParser:
 
     demo = commands.add_parser("demo", help="everything on this machine, with a live view")
     demo.add_argument("--cycles", type=_positive_int, default=8, help="work cycles (default 8)")
-    demo.add_argument("--seed", type=int, default=1, help="of the operator's day (default 1)")
+    demo.add_argument("--seed", type=int, default=2, help="of the operator's day (default 2)")
     demo.set_defaults(command=_demo)
 
     run = commands.add_parser("run", help="the daemon")

@@ -33,10 +33,9 @@ from rampe_guard.settings import load_site
 from rampe_guard.view.observer import Heard, Observer
 from rampe_guard.view.watch import watch
 
-_START_S = 30.0
 _END_S = 3.0
 _SCORE_S = 0.035
-_AFTERMATH_S = 1.0
+_AFTERMATH_S = 0.3
 """How long the guard may still speak after the operator has gone home [s]."""
 
 
@@ -56,15 +55,15 @@ def demo(cycles: int, seed: int, console: Console, stop: StopFlag) -> int:
         start = stack.enter_context(_children())
         router = start("router", ["-m", "rampe_guard.runtime.router", endpoint])
         guard = start("guard", ["-m", "rampe_guard", "run", site_path, "--connect", endpoint])
+        # the operator waits for a listener before he begins to work
+        work = ["-m", "rampe_guard.simulate.process", "--connect", endpoint]
+        operator = start("operator", [*work, "--cycles", str(cycles), "--seed", str(seed)])
         machine = load_machine(site)
         bus = Bus.open_retrying(site.zenoh, stop, Sayer("rampe_guard.demo").info, stop.wait)
         if bus is None:
             return 0
         stack.enter_context(bus)
         observer = Observer(bus, site, machine.arm.limits)
-        _wait_for_heartbeat(observer, stop, [router, guard])
-        work = ["-m", "rampe_guard.simulate.process", "--connect", endpoint]
-        operator = start("operator", [*work, "--cycles", str(cycles), "--seed", str(seed)])
         score = _Score(Tally(machine.sweeper, machine.sweeper.zones), operator, [router, guard])
         watch(observer, stop, console, score.take)
     console.print(closing_table(score.tally, None if stop() else cycles, score.loop_ms))
@@ -139,17 +138,6 @@ class _Starter:
         )
         self.processes.append(process)
         return process
-
-
-def _wait_for_heartbeat(
-    observer: Observer, stop: StopFlag, needed: Sequence[subprocess.Popen[bytes]]
-) -> None:
-    until = time.monotonic() + _START_S
-    while observer.state.health is None and not stop.wait(0.05):
-        _check_alive(needed)
-        if time.monotonic() > until:
-            raise ConnectionFailedError(f"the guard gave no heartbeat within {_START_S:g} s")
-        observer.poll()
 
 
 def _check_alive(needed: Sequence[subprocess.Popen[bytes]]) -> None:
