@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from types import TracebackType
@@ -21,6 +22,8 @@ from rampe_guard.settings import ZenohSettings
 
 _TRY_MS = 1000
 """One attempt to connect; longer ones cannot be interrupted by a signal."""
+_TOKEN_GRACE_S = 1.0
+"""Existing tokens are told of within milliseconds after the subscription."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,18 +57,25 @@ class Inbox:
 
 
 class Liveness:
-    """Whether a liveliness token exists on one key; None until anything was heard of it."""
+    """Whether a liveliness token exists on one key.
+
+    None for the first second, until anything was heard of it: a token that has never been
+    seen by then is not there, which is no better than one that went.
+    """
 
     def __init__(self, session: zenoh.Session, key: str) -> None:
         self._subscriber = session.liveliness().declare_subscriber(
             key, zenoh.handlers.RingChannel(16), history=True
         )
+        self._known_at_s = time.monotonic() + _TOKEN_GRACE_S
         self.alive: bool | None = None
 
     def poll(self) -> bool | None:
         """The newest state; never blocks."""
         while (sample := self._subscriber.try_recv()) is not None:
             self.alive = sample.kind == zenoh.SampleKind.PUT
+        if self.alive is None and time.monotonic() >= self._known_at_s:
+            self.alive = False
         return self.alive
 
 
