@@ -51,15 +51,19 @@ class ZoneSearch:
         self._touch: _Touch | None = None
 
     def run(self, *, clearance: bool) -> ZoneSweep:
-        """Certify the zone; with ``clearance`` also say how near the path comes to it."""
+        """Certify the zone; with ``clearance`` also say how near the path comes to it.
+
+        Without it, the clearances are what certifying happened to prove, and at the start it
+        is only settled whether the arm is inside, and if so whether it moves further in.
+        """
         closing = bool(self._path.displacement.any())  # until the contrary is shown
         done = now_known = False
         try:
-            self._clearance_now()
+            self._clearance_now(sharp=clearance)
             now_known = True
             self._certify()
             done = True
-            closing = closing and self._closing()
+            closing = closing and self._closing(sharp=clearance)
             if clearance and self._touch is None:
                 self._clearance_on_the_way()
         except BudgetSpentError:
@@ -68,10 +72,11 @@ class ZoneSearch:
 
     # --- the start -------------------------------------------------------------------------
 
-    def _clearance_now(self) -> None:
+    def _clearance_now(self, *, sharp: bool) -> None:
         """Raise the bounds at the start until the least is within the tolerance of the truth.
 
         Near the margin that is the tolerance of a contact: whether the arm is inside decides.
+        Not ``sharp``, that decision is all that is wanted.
         """
         rows = self._rows
         while True:
@@ -79,6 +84,8 @@ class ZoneSearch:
             link = self._link_now = int(rows.link[row])
             slack = self._slack if self._least > self._near + self._slack else self._fine
             if rows.start[row] >= self._least - slack:
+                return
+            if not sharp and rows.start[row] > self._near:
                 return
             if not rows.tried[row, 0]:
                 gap = rows.query(row, 0)
@@ -95,13 +102,18 @@ class ZoneSearch:
         mine = self._rows.link == link
         self._rows.start[mine] = np.maximum(self._rows.start[mine], distance)
 
-    def _closing(self) -> bool:
-        """Does a link inside the margin, or else the nearest one, come nearer at the start?"""
+    def _closing(self, *, sharp: bool) -> bool:
+        """Does a link inside the margin, or else the nearest one, come nearer at the start?
+
+        Outside and not ``sharp``, any motion counts as closing in.
+        """
         rows = self._rows
         for row in np.flatnonzero(rows.start <= self._near):
             if not rows.tried[row, 0]:
                 rows.query(int(row), 0)
         inside = np.flatnonzero(rows.start <= self._near)
+        if not inside.size and not sharp:
+            return True
         if not inside.size:
             return self._approaches(self._link_now, exact=False)
         links = sorted({int(link) for link in rows.link[inside]})
@@ -144,6 +156,7 @@ class ZoneSearch:
         """Conservative advancement of one link through one cell, up to its first contact."""
         rows = self._rows
         s, end = self._ends(cell)
+        whole = self._touch is None or end <= self._touch.fraction
         if self._touch is not None:
             end = min(end, self._touch.fraction)
         mine = np.flatnonzero((rows.link == link) & (rows.doubt[:, cell] <= self._near))
@@ -156,6 +169,7 @@ class ZoneSearch:
                 nearest = rows.distance(link, s)
                 if nearest.distance_m <= self._near:
                     self._touch = _Touch(s, link, nearest.point_m)
+                    whole = False
                     break
                 room = nearest.distance_m - self._target
                 step = max(step, ratio(room, float(self._path.rate[link, cell])))
@@ -165,7 +179,8 @@ class ZoneSearch:
                 break
             s += step
         rows.doubt[mine, cell] = np.inf
-        rows.bound[mine, cell] = np.maximum(rows.bound[mine, cell], self._zone.margin_m)
+        if whole:
+            rows.bound[mine, cell] = np.maximum(rows.bound[mine, cell], self._zone.margin_m)
 
     def _clearance_on_the_way(self) -> None:
         """Raise the bounds until the least over the path is within the tolerance of the truth."""

@@ -144,3 +144,21 @@ def pendulum(
     urdf = folder / "pendulum.urdf"
     urdf.write_text(PENDULUM)
     return describe(urdf, ["turn"], [DirectDrive() if drive is None else drive], [limits])
+
+
+GANTRY = """<robot name="gantry">
+  <link name="rail"/><link name="bridge"/>
+  <link name="tool"><collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link>
+  <joint name="x" type="prismatic"><parent link="rail"/><child link="bridge"/>
+    <axis xyz="1 0 0"/><limit lower="-5" upper="5"/></joint>
+  <joint name="y" type="prismatic"><parent link="bridge"/><child link="tool"/>
+    <axis xyz="0 1 0"/><limit lower="-5" upper="5"/></joint>
+</robot>
+"""
+
+
+def gantry(folder: Path) -> ArmDescription:
+    """A box that two slides move in the plane."""
+    urdf = folder / "gantry.urdf"
+    urdf.write_text(GANTRY)
+    return describe(urdf, ["x", "y"])
