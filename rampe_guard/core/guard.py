@@ -170,7 +170,7 @@ class Guard:
         evidence: dict[str, list[Evidence]] = {}
         sweeps = []
         for forecast in forecasts:
-            result = self._sweeper.sweep(q, forecast.displacement)
+            result = self._sweeper.sweep(q, forecast.displacement, clearance=False)
             if result.certificate is Certificate.UNKNOWN:
                 self._monitor.sweep_unknown(now_s)
             for zone in result.zones:

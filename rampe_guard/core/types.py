@@ -182,7 +182,15 @@ class PathSweeper(Protocol):
     """What the guard needs of geometry: a certified sweep of a straight actuator path."""
 
     def sweep(
-        self, start: FloatArray, displacement: FloatArray, *, any_path: bool = False
+        self,
+        start: FloatArray,
+        displacement: FloatArray,
+        *,
+        any_path: bool = False,
+        clearance: bool = True,
     ) -> SweepResult:
-        """Sweep from ``start`` (n,) along ``displacement`` (n,), both in actuator units."""
+        """Sweep from ``start`` (n,) along ``displacement`` (n,), both in actuator units.
+
+        Without ``clearance``, clearances are proven but need not be sharp.
+        """
         ...

@@ -14,6 +14,13 @@ from rampe_guard.core.types import Certificate, FloatArray, PathSweeper, ZoneSwe
 from rampe_guard.evaluate.episodes import Contact
 
 
+LEAVE = 0.005
+"""An arm is out of a zone again when it is clear by this much [m] (limits: actuator unit).
+
+An arm that rests at an edge crosses it with every tremble of its encoders; that is no entry.
+"""
+
+
 @dataclass(frozen=True, slots=True)
 class ContactEvent:
     """The arm entered or left the margin of ``contact.zone`` at ``time_s`` [s]."""
@@ -27,7 +34,7 @@ class Referee:
     """Follows the arm and keeps every contact; `feed` it samples in order of time.
 
     An entry is timed by the contact fraction of the sweep that found it. Leaving is known
-    at the first sample that is outside. A sweep without an answer counts as contact, from
+    at the first sample that is outside by `LEAVE`. A sweep without an answer counts as contact, from
     the first fraction that it could not certify, and is marked ``unknown``.
     """
 
@@ -65,7 +72,7 @@ class Referee:
         # The first sample is a sweep of no length: is the arm inside something already?
         from_s, start = (time_s, position) if self._last is None else self._last
         self._last = (time_s, position)
-        result = self._sweeper.sweep(start, position - start)
+        result = self._sweeper.sweep(start, position - start, clearance=False)
         events: list[ContactEvent] = []
         for zone in result.zones:
             events.extend(self._judge(zone, from_s, time_s))
@@ -76,7 +83,8 @@ class Referee:
         free = zone.certificate is Certificate.FREE
         fraction = 0.0 if zone.contact_fraction is None else zone.contact_fraction
         on = self._open.get(zone.zone)
-        if on is not None and (free or fraction > 0.0):
+        out = (free or fraction > 0.0) and (zone.clearance_now_m or 0.0) > LEAVE
+        if on is not None and out:
             closed = replace(on, left_s=from_s)
             self._closed.append(closed)
             del self._open[zone.zone]

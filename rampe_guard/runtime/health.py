@@ -44,10 +44,15 @@ class TimedSweeper:
         self._spent = spent
 
     def sweep(
-        self, start: FloatArray, displacement: FloatArray, *, any_path: bool = False
+        self,
+        start: FloatArray,
+        displacement: FloatArray,
+        *,
+        any_path: bool = False,
+        clearance: bool = True,
     ) -> SweepResult:
         """See `PathSweeper.sweep`."""
-        result = self._inner.sweep(start, displacement, any_path=any_path)
+        result = self._inner.sweep(start, displacement, any_path=any_path, clearance=clearance)
         if result.elapsed_ms is not None:
             self._spent.add(result.elapsed_ms)
         return result

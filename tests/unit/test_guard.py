@@ -35,10 +35,16 @@ class Wall:
     answer: Certificate | None = None
 
     def sweep(
-        self, start: FloatArray, displacement: FloatArray, *, any_path: bool = False
+        self,
+        start: FloatArray,
+        displacement: FloatArray,
+        *,
+        any_path: bool = False,
+        clearance: bool = True,
     ) -> SweepResult:
         """Closed form."""
         assert not any_path
+        assert not clearance
         edge = self.at - 0.1
         now, way = edge - float(start[0]), float(displacement[0])
         fraction = 0.0 if now <= 0 else now / way if way >= now > 0 else None

@@ -17,9 +17,14 @@ class WallAtOne:
     """Contact while the first actuator is at 1.0 or above; no answer above 5.0."""
 
     def sweep(
-        self, start: FloatArray, displacement: FloatArray, *, any_path: bool = False
+        self,
+        start: FloatArray,
+        displacement: FloatArray,
+        *,
+        any_path: bool = False,
+        clearance: bool = True,
     ) -> SweepResult:
-        del any_path
+        del any_path, clearance
         a, b = float(start[0]), float(start[0] + displacement[0])
         kind, fraction = Certificate.FREE, None
         if max(a, b) >= 5.0:
@@ -99,3 +104,9 @@ def test_on_the_demo_machine_a_swing_too_far_is_a_contact_with_the_wall() -> Non
     assert not contact.unknown
     assert 0.4 < contact.entered_s < 0.6
     assert contact.left_s == pytest.approx(0.8)
+
+
+def test_trembling_at_the_edge_is_one_contact() -> None:
+    referee = run([0.5, 1.001, 0.999, 1.001, 0.998, 1.002, 0.5, 0.5])
+    assert len(referee.contacts) == 1
+    assert referee.contacts[0].left_s is not None
