@@ -48,9 +48,12 @@ def test_without_clearance_the_certificates_are_the_same(tmp_path: Path) -> None
         full = sweeper.sweep(start, displacement)
         quick = sweeper.sweep(start, displacement, clearance=False)
         for a, b in zip(full.zones, quick.zones, strict=True):
-            assert (a.certificate, a.contact_fraction) == (b.certificate, b.contact_fraction)
-            if a.clearance_m is not None and b.clearance_m is not None:
-                assert b.clearance_m <= a.clearance_m
+            assert a.certificate is b.certificate
+            assert a.contact_fraction == pytest.approx(b.contact_fraction, abs=1e-3)
+            if a.certificate is Certificate.FREE:
+                assert b.clearance_m is not None
+                assert a.clearance_m is not None
+                assert b.clearance_m <= a.clearance_m + SweepConfig().clearance_tolerance_m
 
 
 def _timeless(result: SweepResult) -> SweepResult:
