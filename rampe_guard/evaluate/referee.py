@@ -13,7 +13,6 @@ import numpy as np
 from rampe_guard.core.types import Certificate, FloatArray, PathSweeper, ZoneSweep
 from rampe_guard.evaluate.episodes import Contact
 
-
 LEAVE = 0.005
 """An arm is out of a zone again when it is clear by this much [m] (limits: actuator unit).
 
@@ -34,7 +33,7 @@ class Referee:
     """Follows the arm and keeps every contact; `feed` it samples in order of time.
 
     An entry is timed by the contact fraction of the sweep that found it. Leaving is known
-    at the first sample that is outside by `LEAVE`. A sweep without an answer counts as contact, from
+    at the first sample outside by `LEAVE`. A sweep without an answer counts as contact, from
     the first fraction that it could not certify, and is marked ``unknown``.
     """
 
