@@ -134,9 +134,12 @@ class CoarseBounds:
         self._starts = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.intp)
         self._sphere_link = np.repeat(links, sizes)
         boxes = [_coarse_box(piece) for piece in obstacles]
-        self._rotation = np.concatenate([rotation for _, rotation, _, _ in boxes], axis=1)
-        self._center = np.array([rotation.T @ center for center, rotation, _, _ in boxes])
-        self._half = np.array([half for _, _, half, _ in boxes])
+        # all first axes, then all second, then all third: long rows are quick to run through
+        axes = np.array([rotation for _, rotation, _, _ in boxes])
+        self._axes = axes.transpose(1, 2, 0).reshape(3, -1)
+        centers = np.array([center for center, _, _, _ in boxes])
+        self._center = np.einsum("zca,zc->az", axes, centers).ravel()
+        self._half = np.array([half for _, _, half, _ in boxes]).T.ravel()
         self._radius = np.array([radius for _, _, _, radius in boxes])
 
     def __call__(self, rotations: FloatArray, translations: FloatArray) -> FloatArray:
@@ -146,15 +149,20 @@ class CoarseBounds:
             rotations: of all links (k, L, 3, 3).
             translations: (k, L, 3) [m].
         """
-        k, link = rotations.shape[0], self._sphere_link
+        k, link, count = rotations.shape[0], self._sphere_link, len(self._radius)
         centers = (rotations[:, link] @ self._centers[:, :, None])[..., 0] + translations[:, link]
-        local = (centers.reshape(-1, 3) @ self._rotation).reshape(k, len(link), -1, 3)
-        outside = np.abs(local - self._center)
+        outside = centers.reshape(-1, 3) @ self._axes
+        outside -= self._center
+        np.abs(outside, out=outside)
         outside -= self._half
         np.maximum(outside, 0.0, out=outside)
-        distance = np.sqrt(np.einsum("kszc,kszc->ksz", outside, outside))
-        distance -= self._radii[:, None]
+        np.square(outside, out=outside)
+        distance = outside[:, :count] + outside[:, count : 2 * count]
+        distance += outside[:, 2 * count :]
+        np.sqrt(distance, out=distance)
         distance -= self._radius
+        distance = distance.reshape(k, len(link), count)
+        distance -= self._radii[:, None]
         return np.asarray(np.minimum.reduceat(distance, self._starts, axis=1))
 
 

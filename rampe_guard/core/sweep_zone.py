@@ -140,7 +140,7 @@ class ZoneSearch:
     def _certify(self) -> None:
         """Clear every doubtful cell, the earliest first, or find the first contact."""
         rows, s = self._rows, self._path.fractions
-        for cell in range(self._path.cells):
+        for cell in np.flatnonzero((rows.doubt <= self._near).any(axis=0)).tolist():
             while self._touch is None or s[cell] < self._touch.fraction:
                 row = int(np.argmin(rows.doubt[:, cell]))
                 if rows.doubt[row, cell] > self._near:
