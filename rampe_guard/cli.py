@@ -32,21 +32,25 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _demo(args: argparse.Namespace) -> int:
+    from rampe_guard.runtime.stopping import StopFlag
+
+    stop = StopFlag.on_signals()  # before the imports, which take a while
     from rich.console import Console
 
     from rampe_guard.programs.demo import demo
-    from rampe_guard.runtime.stopping import StopFlag
 
-    return demo(args.cycles, args.seed, Console(), StopFlag.on_signals())
+    return demo(args.cycles, args.seed, Console(), stop)
 
 
 def _run(args: argparse.Namespace) -> int:
-    from rampe_guard.runtime.daemon import run
-    from rampe_guard.runtime.say import configure
     from rampe_guard.runtime.stopping import StopFlag
 
+    stop = StopFlag.on_signals()  # before the imports, which take a while
+    from rampe_guard.runtime.daemon import run
+    from rampe_guard.runtime.say import configure
+
     configure()
-    return run(args.site, args.connect, StopFlag.on_signals())
+    return run(args.site, args.connect, stop)
 
 
 def _check(args: argparse.Namespace) -> int:

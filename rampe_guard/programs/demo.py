@@ -58,7 +58,9 @@ def demo(cycles: int, seed: int, console: Console, stop: StopFlag) -> int:
         # the operator waits for a listener before he begins to work
         work = ["-m", "rampe_guard.simulate.process", "--connect", endpoint]
         operator = start("operator", [*work, "--cycles", str(cycles), "--seed", str(seed)])
-        machine = load_machine(site)
+        machine = stop.unless_stopped(lambda: load_machine(site))
+        if machine is None:
+            return 0
         bus = Bus.open_retrying(site.zenoh, stop, Sayer("rampe_guard.demo").info, stop.wait)
         if bus is None:
             return 0

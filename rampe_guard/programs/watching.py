@@ -21,12 +21,14 @@ from rampe_guard.view.watch import watch
 def watch_site(site_path: str, endpoints: Sequence[str], console: Console, stop: StopFlag) -> int:
     """Show a machine until told to stop; waits for a router if there is none."""
     site = connect_to(load_site(site_path), endpoints)
-    limits = load_machine(site).arm.limits
+    machine = stop.unless_stopped(lambda: load_machine(site))
+    if machine is None:
+        return 0
     bus = Bus.open_retrying(site.zenoh, stop, console.print, stop.wait)
     if bus is None:
         return 0
     with bus:
-        watch(Observer(bus, site, limits), stop, console)
+        watch(Observer(bus, site, machine.arm.limits), stop, console)
     return 0
 
 

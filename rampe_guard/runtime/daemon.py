@@ -27,7 +27,9 @@ def run(site_path: str, endpoints: Sequence[str], stop: StopFlag) -> int:
         raise SettingsError(
             f"{site.path}: format: {site.format!r} is not supported by this version; use json"
         )
-    machine = load_machine(site)
+    machine = stop.unless_stopped(lambda: load_machine(site))
+    if machine is None:
+        return 0
     say.info(f"{site.machine} at {site.name}: {len(machine.sweeper.zones)} zones loaded")
     bus = Bus.open_retrying(site.zenoh, stop, lambda text: say.warn("connect", text), stop.wait)
     if bus is None:

@@ -1,11 +1,21 @@
-"""SIGINT and SIGTERM as one flag that loops look at and sleep on."""
+"""SIGINT and SIGTERM as one flag that loops look at and sleep on.
+
+Long work that never looks at the flag (meshes to load, say) is broken off where it stands.
+"""
 
 from __future__ import annotations
 
 import signal
 import threading
+from collections.abc import Callable
 from types import FrameType
-from typing import Self
+from typing import Self, TypeVar
+
+T = TypeVar("T")
+
+
+class _BrokenOff(BaseException):
+    """Not an `Exception`: no handler of errors on the way may take it for one."""
 
 
 class StopFlag:
@@ -13,6 +23,7 @@ class StopFlag:
 
     def __init__(self) -> None:
         self._event = threading.Event()
+        self._at_once = False
 
     @classmethod
     def on_signals(cls) -> Self:
@@ -21,6 +32,9 @@ class StopFlag:
 
         def stop(_signal: int, _frame: FrameType | None) -> None:
             flag.set()
+            if flag._at_once:
+                flag._at_once = False
+                raise _BrokenOff
 
         signal.signal(signal.SIGINT, stop)
         signal.signal(signal.SIGTERM, stop)
@@ -29,6 +43,19 @@ class StopFlag:
     def set(self) -> None:
         """Stop."""
         self._event.set()
+
+    def unless_stopped(self, work: Callable[[], T]) -> T | None:
+        """The result of ``work()``; None if a signal came before or meanwhile.
+
+        Only for work that may end anywhere: it holds no lock, file or session.
+        """
+        try:
+            self._at_once = True
+            return None if self() else work()
+        except _BrokenOff:
+            return None
+        finally:
+            self._at_once = False
 
     def wait(self, seconds: float) -> bool:
         """Sleep, but no longer than until the flag is set; returns whether it is."""

@@ -57,7 +57,9 @@ def main() -> int:
     try:
         site = connect_to(load_site(args.site), args.connect)
         work = frames(site, args.cycles, args.seed, args.rate)
-        first = next(work)  # loads the machine before the clock starts
+        first = stop.unless_stopped(lambda: next(work))  # loads the machine before time counts
+        if first is None:
+            return 0
         bus = Bus.open_retrying(site.zenoh, stop, say.info, stop.wait)
         if bus is None:
             return 0
