@@ -6,7 +6,7 @@ Long work that never looks at the flag (meshes to load, say) is broken off where
 from __future__ import annotations
 
 import signal
-import threading
+import time
 from collections.abc import Callable
 from types import FrameType
 from typing import Self, TypeVar
@@ -18,11 +18,20 @@ class _BrokenOff(BaseException):
     """Not an `Exception`: no handler of errors on the way may take it for one."""
 
 
+_SLICE_S = 0.05
+"""Longest sleep between two looks at the flag."""
+
+
 class StopFlag:
-    """Set once, never cleared. Calling it tells whether to stop."""
+    """Set once, never cleared. Calling it tells whether to stop.
+
+    A plain boolean, on purpose: a signal handler runs in the middle of whatever the main
+    thread does, and a `threading.Event` that is set there while the same thread waits on it
+    waits for its own lock for ever.
+    """
 
     def __init__(self) -> None:
-        self._event = threading.Event()
+        self._stopped = False
         self._at_once = False
 
     @classmethod
@@ -42,7 +51,7 @@ class StopFlag:
 
     def set(self) -> None:
         """Stop."""
-        self._event.set()
+        self._stopped = True
 
     def unless_stopped(self, work: Callable[[], T]) -> T | None:
         """The result of ``work()``; None if a signal came before or meanwhile.
@@ -58,9 +67,12 @@ class StopFlag:
             self._at_once = False
 
     def wait(self, seconds: float) -> bool:
-        """Sleep, but no longer than until the flag is set; returns whether it is."""
-        return self._event.wait(seconds)
+        """Sleep, but little longer than until the flag is set; returns whether it is."""
+        until_s = time.monotonic() + seconds
+        while not self._stopped and (left_s := until_s - time.monotonic()) > 0.0:
+            time.sleep(min(left_s, _SLICE_S))
+        return self._stopped
 
     def __call__(self) -> bool:
         """Whether to stop."""
-        return self._event.is_set()
+        return self._stopped
