@@ -58,6 +58,7 @@ def demo(cycles: int, seed: int, console: Console, stop: StopFlag) -> int:
         # the operator waits for a listener before he begins to work
         work = ["-m", "rampe_guard.simulate.process", "--connect", endpoint]
         operator = start("operator", [*work, "--cycles", str(cycles), "--seed", str(seed)])
+        console.print("router, guard and operator are starting; the quarry is being loaded …")
         machine = stop.unless_stopped(lambda: load_machine(site))
         if machine is None:
             return 0
@@ -67,6 +68,7 @@ def demo(cycles: int, seed: int, console: Console, stop: StopFlag) -> int:
         stack.enter_context(bus)
         observer = Observer(bus, site, machine.arm.limits)
         score = _Score(Tally(machine.sweeper, machine.sweeper.zones), operator, [router, guard])
+        console.print("watching; Ctrl-C ends the demo with a summary")
         watch(observer, stop, console, score.take)
     console.print(closing_table(score.tally, None if stop() else cycles, score.loop_ms))
     return 0
