@@ -7,10 +7,10 @@ import time
 
 import numpy as np
 import pytest
-from jsonschema import Draft202012Validator
 
 from rampe_guard.assembly import load_machine
 from rampe_guard.settings import Site
+from tests.support.contract import Contract
 from tests.support.processes import command, until
 from tests.support.rig import Sent
 from tests.support.station import HANDS_OFF, REST, TO_CRATE, Station
@@ -119,9 +119,7 @@ def test_an_active_alert_repeats_at_5_hz_and_can_be_acknowledged(live: Station) 
     live.calm()
 
 
-def test_everything_heard_keeps_the_contract(
-    live: Station, validators: dict[str, Draft202012Validator]
-) -> None:
+def test_everything_heard_keeps_the_contract(live: Station, contract: Contract) -> None:
     (state,) = live.ears.ask(f"{live.site.keys.base}/state")
     bodies = [h.body for h in live.ears.all()] + [state]
     assert {b["schema"] for b in bodies} == {
@@ -131,7 +129,7 @@ def test_everything_heard_keeps_the_contract(
         "rampe.state.v1",
     }
     for body in bodies:
-        validators[body["schema"]].validate(body)
+        contract.check(body)
     assert len({h.body["boot_id"] for h in live.ears.all()}) == 1
     for topic in ("alert", "prediction", "heartbeat"):
         seqs = [h.body["seq"] for h in live.ears.since(0.0, topic)]

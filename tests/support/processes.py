@@ -17,6 +17,7 @@ T = TypeVar("T")
 
 ROOT = Path(__file__).resolve().parents[2]
 BENCH = ROOT / "config" / "sites" / "bench.yaml"
+DEMO = ROOT / "config" / "sites" / "demo.yaml"
 START_S = 40.0
 """Two slow cores, meshes to load: far above what a start takes, so only a hang reaches it."""
 
@@ -123,7 +124,7 @@ def router(folder: Path, endpoint: str) -> Process:
 
 def guard(folder: Path, site: Path, endpoint: str) -> Process:
     """A guard that works when this returns."""
-    args = ["-m", "rampe_guard", "run", site, "--connect", endpoint]
+    args = ["-m", "rampe_guard", "run", str(site), "--connect", endpoint]
     process = Process(folder, "guard", args)
     try:
         process.wait_for("guarding on")
