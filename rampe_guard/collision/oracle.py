@@ -138,7 +138,7 @@ FAR_M = 1e7
 
 
 def _plane(zone: Zone | ActuatorLimit) -> HalfspacePiece | None:
-    first = zone.pieces[0] if isinstance(zone, Zone) else None
+    first = zone.pieces[0].piece if isinstance(zone, Zone) else None
     return first if isinstance(first, HalfspacePiece) else None
 
 

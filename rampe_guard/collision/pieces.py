@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import fcl
@@ -10,7 +11,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from rampe_guard.collision.mesh import IntArray, TriangleMesh
 from rampe_guard.core.convex import ConvexPiece, oriented_box
-from rampe_guard.core.sweep_problem import LinkBody
+from rampe_guard.core.sweep_problem import PieceTree
 
 if TYPE_CHECKING:
     from rampe_guard.core.types import FloatArray
@@ -18,34 +19,52 @@ if TYPE_CHECKING:
 SKIN_M = 1e-5
 """Flat sets of points get this thickness where a hull must have a volume [m]."""
 EXCESS_SAMPLES = 64
+MEASURED_SHARE = 8
+"""Pieces with less than this part of the leaves are not measured: it takes milliseconds each."""
 INSIDE = 0.3
 """Winding number from which a point counts as inside a mesh that may be open."""
 EXCESS_TRIANGLES = 20_000
 """Above so many triangles the bulge of a hull is not measured but taken as its size."""
 
 
-def link_body(mesh: TriangleMesh, excess_m: float, most: int) -> LinkBody:
-    """A link's hull and, if that bulges, its pieces."""
-    (whole,) = convex_pieces(mesh, excess_m, 1)
-    pieces = convex_pieces(mesh, excess_m, most)
-    return LinkBody(whole, tuple(pieces) if len(pieces) > 1 else ())
+def piece_tree(mesh: TriangleMesh, excess_m: float, most: int, *, measured: bool) -> PieceTree:
+    """Hull of a mesh, cut in halves until no hull bulges more than ``excess_m`` beyond it.
 
+    Every triangle is whole in one half, so the halves contain what was cut, however it was.
 
-def convex_pieces(mesh: TriangleMesh, excess_m: float, most: int) -> list[ConvexPiece]:
-    """Cut a mesh until no hull bulges more than ``excess_m`` beyond it, into ``most`` pieces.
-
-    Every triangle is whole in one piece, so the pieces contain the mesh whatever is cut.
+    Args:
+        mesh: link or obstacle.
+        excess_m: bulge that needs no further cut [m].
+        most: how many leaves there may be.
+        measured: whether bulges of the larger pieces are measured by samples; all others are
+            taken for the pieces' thickness.
     """
     surface = fcl.CollisionObject(fcl_bvh(mesh))
-    pieces = [(mesh, _piece(mesh, mesh, surface))]
-    while len(pieces) < most:
-        worst = max(range(len(pieces)), key=lambda i: pieces[i][1].excess)
-        part, piece = pieces[worst]
+
+    def grow(part: TriangleMesh, leaves: int, bulge: float) -> PieceTree:
+        sampled = measured and leaves * MEASURED_SHARE >= most
+        piece = _piece(part, mesh, surface if sampled else None)
+        piece = replace(piece, excess=min(piece.excess, bulge))
+        if leaves < 2 or piece.excess <= excess_m:  # noqa: PLR2004
+            return PieceTree(piece)
         halves = _halves(part, piece)
-        if piece.excess <= excess_m or halves is None:
-            break
-        pieces[worst : worst + 1] = [(half, _piece(half, mesh, surface)) for half in halves]
-    return [piece for _, piece in pieces]
+        if halves is None:
+            return PieceTree(piece)
+        return PieceTree(piece, tuple(grow(half, leaves // 2, piece.excess) for half in halves))
+
+    return grow(mesh, most, np.inf)
+
+
+def cut(tree: PieceTree, most: int) -> list[PieceTree]:
+    """Up to ``most`` branches that contain what the tree does."""
+    branches = [tree]
+    while True:
+        sizes = [branch.piece.excess if branch.halves else -1.0 for branch in branches]
+        worst = int(np.argmax(sizes))
+        halves = branches[worst].halves
+        if not halves or len(branches) + len(halves) - 1 > most:
+            return branches
+        branches[worst : worst + 1] = halves
 
 
 def hull(points: FloatArray) -> tuple[FloatArray, IntArray]:
@@ -95,7 +114,9 @@ def speck(point: FloatArray, other: FloatArray | None = None) -> TriangleMesh:
     return TriangleMesh(corners, np.array([[0, 1, 2]], dtype=np.int64))
 
 
-def _piece(part: TriangleMesh, whole: TriangleMesh, surface: fcl.CollisionObject) -> ConvexPiece:
+def _piece(
+    part: TriangleMesh, whole: TriangleMesh, surface: fcl.CollisionObject | None
+) -> ConvexPiece:
     used = part.vertices[np.unique(part.faces)]
     try:
         vertices = used[ConvexHull(used).vertices]
@@ -104,6 +125,8 @@ def _piece(part: TriangleMesh, whole: TriangleMesh, surface: fcl.CollisionObject
     center, rotation, half = oriented_box(vertices)
     if len(part.faces) == 1:
         excess = 0.0
+    elif surface is None:
+        excess = 2.0 * float(half.min())
     elif len(whole.faces) > EXCESS_TRIANGLES:
         excess = 2.0 * float(np.linalg.norm(half))
     else:

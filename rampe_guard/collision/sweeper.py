@@ -9,20 +9,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rampe_guard.collision.oracle import FclOracle
-from rampe_guard.collision.pieces import link_body
+from rampe_guard.collision.pieces import piece_tree
 from rampe_guard.collision.zones import Solid, build_zone
 from rampe_guard.core.config import SweepConfig
+from rampe_guard.core.convex import ConvexPiece
 from rampe_guard.core.scene import ActuatorLimit, Scene
 from rampe_guard.core.sweep import sweep
 from rampe_guard.core.sweep_path import ArmMotion
-from rampe_guard.core.sweep_problem import SweepProblem, Zone
+from rampe_guard.core.sweep_problem import PieceTree, SweepProblem, Zone
 from rampe_guard.errors import GeometryError
 
 if TYPE_CHECKING:
     from rampe_guard.collision.urdf import Arm
     from rampe_guard.core.types import FloatArray, SweepResult
 
-LINK_PIECES = 6
+LINK_LEAVES = 128
+LINK_EXCESS_M = 0.005
 
 
 class FclSweeper:
@@ -46,11 +48,11 @@ class FclSweeper:
         self.arm, self.scene = arm, scene
         self.zones = tuple(item.name for item in scene.objects)
         self._config = SweepConfig() if config is None else config
-        excess = 0.5 * self._config.clearance_tolerance_m
         links = [
-            None if mesh is None else link_body(mesh, excess, LINK_PIECES) for mesh in arm.meshes
+            None if mesh is None else piece_tree(mesh, LINK_EXCESS_M, LINK_LEAVES, measured=True)
+            for mesh in arm.meshes
         ]
-        points = [np.zeros((0, 3)) if body is None else body.hull.vertices for body in links]
+        points = [_vertices(tree) for tree in links]
         motion = ArmMotion(arm.chain, arm.joints, points, arm.proven[:, 0], arm.proven[:, 1])
         zones: list[Zone | ActuatorLimit] = []
         solids: list[Solid | None] = []
@@ -100,6 +102,12 @@ class FclSweeper:
     def link_poses(self, actuators: FloatArray) -> FloatArray:
         """World poses (k, L, 4, 4) of all links for actuator values (k, n)."""
         return self._problem.arm.link_poses(np.asarray(actuators, dtype=float))
+
+
+def _vertices(tree: PieceTree | None) -> FloatArray:
+    if tree is None or not isinstance(tree.piece, ConvexPiece):
+        return np.zeros((0, 3))
+    return tree.piece.vertices
 
 
 def _checked(item: ActuatorLimit, actuators: int) -> ActuatorLimit:

@@ -14,11 +14,11 @@ import fcl
 import numpy as np
 
 from rampe_guard.collision.mesh import TriangleMesh, checked_mesh, load_mesh, prism_mesh
-from rampe_guard.collision.pieces import convex_pieces, fcl_bvh, fcl_convex, speck
+from rampe_guard.collision.pieces import cut, fcl_bvh, fcl_convex, piece_tree, speck
 from rampe_guard.core.convex import ConvexPiece, HalfspacePiece
 from rampe_guard.core.kinematics import apply
 from rampe_guard.core.scene import Box, Capsule, Cylinder, Halfspace, Mesh, SolidObject, Sphere
-from rampe_guard.core.sweep_problem import Zone
+from rampe_guard.core.sweep_problem import PieceTree, Zone
 from rampe_guard.errors import GeometryError
 
 if TYPE_CHECKING:
@@ -29,8 +29,9 @@ if TYPE_CHECKING:
 PRISM_EXCESS_M = 1e-4
 """How far the prism round a cylinder may bulge [m]; it is part of a contact's tolerance."""
 MAX_PRISM_SIDES = 720
-MESH_PIECES = 64
-MESH_EXCESS_M = 0.02
+MESH_LEAVES = 512
+MESH_EXCESS_M = 0.002
+MESH_PIECES = 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +51,7 @@ class Solid:
     closed: tuple[TriangleMesh, ...] = ()
 
 
-Built: TypeAlias = tuple[tuple[ConvexPiece | HalfspacePiece, ...], Solid]
+Built: TypeAlias = tuple[tuple[PieceTree, ...], Solid]
 
 
 def build_zone(item: SolidObject, link_names: Sequence[str]) -> tuple[Zone, Solid]:
@@ -68,7 +69,7 @@ def build_zone(item: SolidObject, link_names: Sequence[str]) -> tuple[Zone, Soli
         raise GeometryError(f"object '{item.name}' has margin_m {item.margin_m}; use 0 or more")
     pieces, solid = _build(item)
     ignored = frozenset(link_names.index(name) for name in item.ignore_links)
-    return Zone(item.name, item.margin_m, pieces, ignored), solid
+    return Zone(item.name, item.margin_m, pieces, ignored, hollow=bool(solid.closed)), solid
 
 
 def _build(item: SolidObject) -> Built:
@@ -93,7 +94,7 @@ def _box(item: Box) -> Built:
     center, rotation = pose[:3, 3], pose[:3, :3]
     piece = ConvexPiece(apply(pose, corners * size), center, rotation, 0.5 * size)
     body = fcl.CollisionObject(fcl.Box(*size), fcl.Transform(rotation, center))
-    return (piece,), Solid(body, 0.0, center[None])
+    return (PieceTree(piece),), Solid(body, 0.0, center[None])
 
 
 def _round(item: Sphere | Capsule, start: Sequence[float], end: Sequence[float], r: float) -> Built:
@@ -106,7 +107,7 @@ def _round(item: Sphere | Capsule, start: Sequence[float], end: Sequence[float],
     core = np.stack([a, b]) if length > 0.0 else a[None]
     piece = ConvexPiece(core, 0.5 * (a + b), basis.T, half, radius=float(radius))
     body = fcl.CollisionObject(fcl_bvh(speck(a, b if length > 0.0 else None)))
-    return (piece,), Solid(body, float(radius), a[None])
+    return (PieceTree(piece),), Solid(body, float(radius), a[None])
 
 
 def _cylinder(item: Cylinder) -> Built:
@@ -118,7 +119,9 @@ def _cylinder(item: Cylinder) -> Built:
     half = np.array([wide, wide, 0.5 * height])
     vertices = apply(pose, prism.vertices)
     piece = ConvexPiece(vertices, pose[:3, 3], pose[:3, :3], half)
-    return (piece,), Solid(fcl.CollisionObject(fcl_convex(vertices)), 0.0, pose[None, :3, 3])
+    return (PieceTree(piece),), Solid(
+        fcl.CollisionObject(fcl_convex(vertices)), 0.0, pose[None, :3, 3]
+    )
 
 
 def _halfspace(item: Halfspace) -> Built:
@@ -126,14 +129,16 @@ def _halfspace(item: Halfspace) -> Built:
     norm = float(np.linalg.norm(normal))
     if not abs(norm - 1.0) < 1e-6:  # noqa: PLR2004  # settings has normed it
         raise GeometryError(f"object '{item.name}' has a normal of length {norm:.6g}; norm it")
-    return (HalfspacePiece(normal / norm, float(offset)),), Solid(None, 0.0, np.zeros((0, 3)))
+    piece = HalfspacePiece(normal / norm, float(offset))
+    return (PieceTree(piece),), Solid(None, 0.0, np.zeros((0, 3)))
 
 
 def _mesh(item: Mesh) -> Built:
     (scale,) = _positive(item, [item.scale])
     placed = load_mesh(item.file).moved(_pose(item, item.pose), float(scale))
     mesh = checked_mesh(placed.vertices, placed.faces, f"object '{item.name}': {item.file}")
-    pieces = tuple(convex_pieces(mesh, MESH_EXCESS_M, MESH_PIECES))
+    tree = piece_tree(mesh, MESH_EXCESS_M, MESH_LEAVES, measured=False)
+    pieces = tuple(cut(tree, MESH_PIECES))
     parts = mesh.components()
     inner = np.array([part.vertices[0] for part in parts])
     closed = tuple(part for part in parts if part.is_watertight())

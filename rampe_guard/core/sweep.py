@@ -116,9 +116,8 @@ def _by_distance(
     blocks = np.moveaxis(blocks, 0, -1)
     zones = []
     for index, table in enumerate(problem.rows):
-        if table.hulls:
-            body, obstacle = table.body[: table.hulls], table.obstacle[: table.hulls]
-            bounds = blocks[body, obstacle], coarse[0, body, obstacle]
+        if len(table.body):
+            bounds = blocks[table.body, table.obstacle], coarse[0, table.body, table.obstacle]
             zones.append((index, Rows(problem, index, path, oracle, budget, bounds)))
     return sorted(zones, key=lambda item: (float(item[1].bound.min()), item[0]))
 

@@ -20,7 +20,7 @@ from rampe_guard.core.types import AnyPath
 
 if TYPE_CHECKING:
     from rampe_guard.core.config import SweepConfig
-    from rampe_guard.core.sweep_problem import ClearanceOracle, RowTable, SweepProblem
+    from rampe_guard.core.sweep_problem import ClearanceOracle, SweepProblem
     from rampe_guard.core.types import FloatArray
 
 
@@ -84,28 +84,29 @@ def _box(
     coarse = problem.coarse(pose[..., :3, :3], pose[..., :3, 3])[0]
     for index, table in enumerate(problem.rows):
         zone = problem.zones[index]
-        if not isinstance(zone, Zone) or not table.hulls:
+        if not isinstance(zone, Zone) or not len(table.body):
             continue
         near = zone.margin_m + config.tolerance_m
-        need = near + reach[table.link]
-        bound = coarse[table.body[: table.hulls], table.obstacle[: table.hulls]]
-        doubtful = [int(row) for row in np.flatnonzero(bound <= need[: table.hulls])]
+        bound = coarse[table.body, table.obstacle]
+        doubtful = np.flatnonzero(bound <= near + reach[table.link])
+        pairs = [(int(table.body[row]), int(table.obstacle[row])) for row in doubtful]
         cleared: set[int] = set()
-        while doubtful:
-            row = doubtful.pop()
-            link = int(table.link[row])
+        while pairs:
+            body, obstacle = pairs.pop()
+            link = problem.body_link[body]
+            need = near + reach[link]
             if link in cleared:
                 continue
-            if _gap(problem, oracle, table, row, pose[0, link], budget) > need[row]:
+            if _gap(problem, oracle, body, obstacle, pose[0, link], budget) > need:
                 continue
-            if row < table.hulls and len(table.pieces[row]):
-                doubtful += [int(piece) for piece in table.pieces[row]]
+            if problem.body_halves[body]:
+                pairs += [(half, obstacle) for half in problem.body_halves[body]]
                 continue
             budget.spend()
             distance = oracle.distance(link, index, pose[0, link]).distance_m
             if distance <= near:
                 return CONTACT
-            if distance <= need[row]:
+            if distance <= need:
                 split = np.zeros(len(lower))
                 np.add.at(split, arm.actuator, shares[:, link])
                 return int(np.argmax(split))
@@ -116,13 +117,12 @@ def _box(
 def _gap(
     problem: SweepProblem,
     oracle: ClearanceOracle,
-    table: RowTable,
-    row: int,
+    body: int,
+    obstacle: int,
     pose: FloatArray,
     budget: Budget,
 ) -> float:
     budget.spend()
-    body, obstacle = int(table.body[row]), int(table.obstacle[row])
     n = oracle.direction(body, obstacle, pose, swapped=False)
     if n is None:
         return -np.inf

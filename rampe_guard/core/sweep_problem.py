@@ -48,99 +48,93 @@ class ClearanceOracle(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
+class PieceTree:
+    """A convex shape that contains a part of a surface, and smaller ones that do so together."""
+
+    piece: ObstaclePiece
+    halves: tuple[PieceTree, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Zone:
     """A solid keep-out object.
 
     Attributes:
         name: of the object.
         margin_m: keep-out distance [m].
-        pieces: convex pieces (or one halfspace) that together contain it.
+        pieces: trees of convex pieces (or one halfspace) that together contain it.
         ignored: indices of links that may touch it.
+        hollow: its inside counts, but its pieces hold no more than its surface.
     """
 
     name: str
     margin_m: float
-    pieces: tuple[ObstaclePiece, ...]
+    pieces: tuple[PieceTree, ...]
     ignored: frozenset[int] = frozenset()
-
-
-@dataclass(frozen=True, slots=True)
-class LinkBody:
-    """A link as one convex hull, and as smaller pieces that together contain it too."""
-
-    hull: ConvexPiece
-    pieces: tuple[ConvexPiece, ...] = ()
+    hollow: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class RowTable:
-    """All (body, obstacle piece) pairs of one zone that must stay apart.
-
-    Bodies are numbered hulls first, then pieces; so are the rows. The row of a hull can be
-    replaced by the rows of its link's pieces.
+    """The pairs of whole links and coarsest obstacle pieces of one zone that must stay apart.
 
     Attributes:
-        body, obstacle, link: of each row (P,).
-        excess: how far its shapes bulge beyond their surfaces, about (P,) [m].
-        hulls: number of rows of hulls.
-        of_obstacle: rows of hulls (A,) against each obstacle piece of the zone.
-        solid: which of the solid links (A,) those rows belong to.
-        pieces: rows that replace each hull row; empty if there are none.
+        body, obstacle, link: of each row (H,).
+        of_obstacle: rows of all solid links (A,) against one obstacle piece.
+        solid: which of the solid links those are (A,).
     """
 
     body: IntArray
     obstacle: IntArray
     link: IntArray
-    excess: FloatArray
-    hulls: int
     of_obstacle: Mapping[int, IntArray]
     solid: IntArray
-    pieces: tuple[IntArray, ...]
 
 
 class SweepProblem:
     """An arm and its zones in the flat form the search works on.
 
+    Bodies are numbered with the hulls of whole links first, obstacles with all zones' coarsest
+    pieces first; what they are cut into follows.
+
     Attributes:
-        solid_links: indices of links with geometry; hull i belongs to solid link i.
-        bodies: all hulls, then all pieces.
-        obstacles: obstacle pieces of all zones.
+        solid_links: indices of links with geometry; body i is the hull of solid link i.
+        bodies, obstacles: all convex shapes.
+        body_halves, obstacle_halves: what each is cut into, by number.
+        body_link: link of each body.
+        vertices: of each body (3, v) [m].
         hull_vertices: of all hulls (S, 3, V) [m], filled up with repetitions.
+        coarse: bounds between all hulls and coarsest obstacle pieces; None without either.
+        rows: one table per zone.
     """
 
     def __init__(
         self,
         arm: ArmMotion,
         link_names: Sequence[str],
-        links: Sequence[LinkBody | None],
+        links: Sequence[PieceTree | None],
         zones: Sequence[Zone | ActuatorLimit],
     ) -> None:
         """``links``: one entry per link, None without geometry."""
         self.arm = arm
         self.link_names = tuple(link_names)
         self.zones = tuple(zones)
-        self.obstacles = [p for zone in zones if isinstance(zone, Zone) for p in zone.pieces]
-        solid = [(link, body) for link, body in enumerate(links) if body is not None]
+        solid = [(link, tree) for link, tree in enumerate(links) if tree is not None]
         self.solid_links = np.array([link for link, _ in solid], dtype=np.intp)
-        self.bodies = [body.hull for _, body in solid]
-        self.body_link = [link for link, _ in solid]
-        self._pieces: list[list[int]] = []
-        for link, body in solid:
-            first = len(self.bodies)
-            self.bodies += body.pieces
-            self.body_link += [link] * len(body.pieces)
-            self._pieces.append(list(range(first, len(self.bodies))))
+        bodies, self.body_halves, roots = _flat([tree for _, tree in solid])
+        self.bodies = [body for body in bodies if isinstance(body, ConvexPiece)]
+        self.body_link = [solid[root][0] for root in roots]
         self.vertices = [np.ascontiguousarray(body.vertices.T) for body in self.bodies]
-        most = max((block.shape[1] for block in self.vertices[: len(solid)]), default=1)
+        hulls = self.vertices[: len(solid)]
+        most = max((block.shape[1] for block in hulls), default=1)
         self.hull_vertices = np.array(
-            [
-                np.pad(block, ((0, 0), (0, most - block.shape[1])), mode="edge")
-                for block in self.vertices[: len(solid)]
-            ]
+            [np.pad(block, ((0, 0), (0, most - block.shape[1])), mode="edge") for block in hulls]
         ).reshape(len(solid), 3, most)
+        trees = [tree for zone in zones if isinstance(zone, Zone) for tree in zone.pieces]
+        self.obstacles, self.obstacle_halves, _ = _flat(trees)
         self.coarse = (
-            CoarseBounds(self.bodies[: len(solid)], self.solid_links, self.obstacles)
-            if solid and self.obstacles
+            CoarseBounds(self.bodies[: len(solid)], self.solid_links, self.obstacles[: len(trees)])
+            if solid and trees
             else None
         )
         self.rows = self._row_tables()
@@ -149,31 +143,30 @@ class SweepProblem:
         tables = []
         first = 0
         for zone in self.zones:
-            pieces = zone.pieces if isinstance(zone, Zone) else ()
+            count = len(zone.pieces) if isinstance(zone, Zone) else 0
             ignored = zone.ignored if isinstance(zone, Zone) else frozenset()
-            tables.append(self._row_table(list(range(first, first + len(pieces))), ignored))
-            first += len(pieces)
+            allowed = [i for i, link in enumerate(self.solid_links) if int(link) not in ignored]
+            solid = np.array(allowed, dtype=np.intp)
+            obstacles = np.arange(first, first + count, dtype=np.intp)
+            body, obstacle = np.repeat(solid, count), np.tile(obstacles, len(solid))
+            of_obstacle = {int(o): np.flatnonzero(obstacle == o) for o in obstacles}
+            tables.append(RowTable(body, obstacle, self.solid_links[body], of_obstacle, solid))
+            first += count
         return tables
 
-    def _row_table(self, obstacles: list[int], ignored: frozenset[int]) -> RowTable:
-        allowed = [i for i, link in enumerate(self.solid_links) if int(link) not in ignored]
-        rows = [(hull, o) for hull in allowed for o in obstacles]
-        hulls = len(rows)
-        replaced: list[IntArray] = []
-        for hull, o in rows[:hulls]:
-            own = self._pieces[hull]
-            replaced.append(np.arange(len(rows), len(rows) + len(own), dtype=np.intp))
-            rows += [(piece, o) for piece in own]
-        body = np.array([row[0] for row in rows], dtype=np.intp)
-        obstacle = np.array([row[1] for row in rows], dtype=np.intp)
-        excess = [self.bodies[b].excess + self.obstacles[o].excess for b, o in rows]
-        return RowTable(
-            body=body,
-            obstacle=obstacle,
-            link=np.array([self.body_link[b] for b in body], dtype=np.intp),
-            excess=np.array(excess),
-            hulls=hulls,
-            of_obstacle={o: np.flatnonzero(obstacle[:hulls] == o) for o in obstacles},
-            solid=np.array(allowed, dtype=np.intp),
-            pieces=tuple(replaced),
-        )
+
+def _flat(
+    trees: Sequence[PieceTree],
+) -> tuple[list[ObstaclePiece], list[tuple[int, ...]], list[int]]:
+    """Pieces of all trees, roots first; the numbers of each one's halves; each one's root."""
+    pieces: list[ObstaclePiece] = [tree.piece for tree in trees]
+    halves: list[tuple[int, ...]] = []
+    roots = list(range(len(trees)))
+    todo = list(trees)
+    for number, tree in enumerate(todo):  # grows as it goes
+        first = len(todo)
+        todo += tree.halves
+        pieces += [half.piece for half in tree.halves]
+        roots += [roots[number]] * len(tree.halves)
+        halves.append(tuple(range(first, len(todo))))
+    return pieces, halves, roots

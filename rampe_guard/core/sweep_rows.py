@@ -17,13 +17,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rampe_guard.core.convex import gaps, lower_support
-from rampe_guard.core.sweep_problem import Nearest
+from rampe_guard.core.sweep_problem import Nearest, Zone
 
 if TYPE_CHECKING:
     from rampe_guard.core.convex import IntArray
     from rampe_guard.core.sweep_path import SweptPath
     from rampe_guard.core.sweep_problem import ClearanceOracle, SweepProblem
-    from rampe_guard.core.types import FloatArray
+    from rampe_guard.core.types import FloatArray, Point
+
+
+SPARE_ROWS = 256
+"""Rows that a zone may gain; when they are used up, exact distances must do."""
 
 
 class BudgetSpentError(Exception):
@@ -51,8 +55,8 @@ class Budget:
 class Rows:
     """Bounds of one zone's rows.
 
-    Rows of pieces are asleep, with infinite bounds, until `replace` wakes them in the place of
-    their hull's row.
+    At first a row is a whole link against one of the zone's coarsest pieces. `replace` puts rows
+    of the halves of one of them in its place; rows that are not in use have infinite bounds.
 
     Attributes:
         bound: proven distance per row and cell (P, K) [m].
@@ -61,7 +65,6 @@ class Rows:
         probe: per row the gap at the start and after the small first step (P, 2) [m], or NaN.
         tried: samples of each row that have been queried (P, K + 1).
         link: link of each row (P,).
-        excess: how far the shapes of each row bulge beyond their surfaces, about (P,) [m].
     """
 
     def __init__(
@@ -73,20 +76,31 @@ class Rows:
         budget: Budget,
         coarse: tuple[FloatArray, FloatArray],
     ) -> None:
-        """``coarse``: bounds of hull rows per cell (H, K), and at the start (H,) [m]."""
+        """``coarse``: bounds of the first rows per cell (H, K), and at the start (H,) [m]."""
         self.path = path
         self._problem, self._zone, self._oracle, self._budget = problem, zone, oracle, budget
+        solid = problem.zones[zone]
+        self._hollow = isinstance(solid, Zone) and solid.hollow
         self._table = table = problem.rows[zone]
-        self.link, self.excess = table.link, table.excess
-        count = len(self.link)
+        first = self._size = self._first = len(table.body)
+        count = first + SPARE_ROWS
+        self._body = np.zeros(count, dtype=np.intp)
+        self._obstacle, self.link = self._body.copy(), self._body.copy()
+        self._body[:first], self._obstacle[:first] = table.body, table.obstacle
+        self.link[:first] = table.link
         self.bound = np.full((count, path.cells), np.inf)
         self.start = np.full(count, np.inf)
-        np.maximum(coarse[0], 0.0, out=self.bound[: table.hulls])
-        np.maximum(coarse[1], 0.0, out=self.start[: table.hulls])
+        np.maximum(coarse[0], 0.0, out=self.bound[:first])
+        np.maximum(coarse[1], 0.0, out=self.start[:first])
         self.doubt = self.bound.copy()
         self.tried = np.zeros((count, path.cells + 1), dtype=bool)
         self.probe = np.full((count, 2), np.nan)
         self._exact: dict[tuple[int, float], Nearest] = {}
+
+    def excess(self, row: int) -> float:
+        """How far the shapes of a row bulge beyond their surfaces, about [m]."""
+        body = self._problem.bodies[self._body[row]]
+        return float(body.excess + self._problem.obstacles[self._obstacle[row]].excess)
 
     def query(self, row: int, sample: int) -> float:
         """Sharpen bounds with a direction found at one sample; the row's gap there [m], or -inf.
@@ -100,8 +114,8 @@ class Rows:
             n, low, vertices = self._direction(row, pose, swapped=swapped)
             if n is None:
                 break
-            if row < self._table.hulls:
-                rows = self._table.of_obstacle[int(self._table.obstacle[row])]
+            if row < self._first:
+                rows = self._table.of_obstacle[int(self._obstacle[row])]
                 g = self._gaps_of_hulls(n, low)
                 mine = int(np.searchsorted(rows, row))
             else:
@@ -135,28 +149,49 @@ class Rows:
         self.doubt[rows] = np.maximum(self.doubt[rows], cell)
         self.start[rows] = np.maximum(self.start[rows], g[:, 0])
 
-    def replace(self, row: int) -> bool:
-        """Put the rows of its link's pieces in the place of a hull's row; False if it has none."""
-        if row >= self._table.hulls or not len(self._table.pieces[row]):
-            return False
-        pieces = self._table.pieces[row]
+    def replace(self, row: int) -> list[int]:
+        """Put rows of the halves of its more bulging shape in a row's place; [] if it has none."""
+        problem = self._problem
+        body, obstacle = int(self._body[row]), int(self._obstacle[row])
+        halves, others = problem.body_halves[body], problem.obstacle_halves[obstacle]
+        if halves and others:
+            less = problem.bodies[body].excess < problem.obstacles[obstacle].excess
+            halves, others = ((), others) if less else (halves, ())
+        pairs = [(half, obstacle) for half in halves] + [(body, other) for other in others]
+        if not pairs or self._size + len(pairs) > len(self.start):
+            return []
+        new = list(range(self._size, self._size + len(pairs)))
+        self._size += len(pairs)
+        for number, (self._body[number], self._obstacle[number]) in zip(new, pairs, strict=True):
+            self.link[number] = self.link[row]
         for bounds in (self.bound, self.doubt, self.start):
-            bounds[pieces] = bounds[row]
+            bounds[new] = bounds[row]
             bounds[row] = np.inf
-        return True
+        return new
 
     def distance(self, link: int, fraction: float) -> Nearest:
-        """Exact distance of a link, remembered; at the start it tells inside from outside too."""
+        """Exact distance of a link's surface from the zone's, remembered."""
         known = self._exact.get((link, fraction))
         if known is None:
             self._budget.spend()
             pose = self.path.poses(fraction)[link]
-            known = self._oracle.distance(link, self._zone, pose)
-            if fraction == 0.0 and known.distance_m > 0.0:
-                inside = self._oracle.contained(link, self._zone, pose)
-                known = known if inside is None else Nearest(0.0, inside)
-            self._exact[link, fraction] = known
+            known = self._exact[link, fraction] = self._oracle.distance(link, self._zone, pose)
         return known
+
+    def contained(self) -> tuple[int, Point] | None:
+        """A link that starts inside the zone or round it, and a point there.
+
+        Pieces hold surfaces, not what they enclose, so no separation of pieces excludes this.
+        Later on the way it cannot come about without surfaces that touch.
+        """
+        first = slice(0, self._first)
+        near = self.link[first] if self._hollow else self.link[first][self.start[first] <= 0.0]
+        for link in sorted(set(near.tolist())):
+            self._budget.spend()
+            point = self._oracle.contained(link, self._zone, self.path.poses(0.0)[link])
+            if point is not None:
+                return link, point
+        return None
 
     def knows_start(self, link: int) -> bool:
         """Whether the exact distance of this link at the start has been asked."""
@@ -196,7 +231,7 @@ class Rows:
     ) -> tuple[FloatArray | None, float, FloatArray]:
         """A direction, the zone's support in it, and the body's vertices (3, v)."""
         self._budget.spend()
-        body, obstacle = int(self._table.body[row]), int(self._table.obstacle[row])
+        body, obstacle = int(self._body[row]), int(self._obstacle[row])
         vertices = self._problem.vertices[body]
         n = self._oracle.direction(body, obstacle, pose, swapped=swapped)
         if n is None:

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from rampe_guard.core.sweep_problem import Zone
     from rampe_guard.core.types import Point
 
+SPLITS = 24
+"""Rows that may be cut in a row before exact distances are asked instead."""
 NOISE_M = 1e-6
 """Smaller changes of a distance than this are no motion [m]."""
 
@@ -59,6 +61,11 @@ class ZoneSearch:
         closing = bool(self._path.displacement.any())  # until the contrary is shown
         done = now_known = False
         try:
+            inside = self._rows.contained()
+            if inside is not None:
+                self._touch = _Touch(0.0, *inside)
+                self._rows.start[:] = np.minimum(self._rows.start, 0.0)
+                return self._result(done=True, now_known=True, closing=closing)
             self._clearance_now(sharp=clearance)
             now_known = True
             self._certify()
@@ -90,13 +97,18 @@ class ZoneSearch:
             if not rows.tried[row, 0]:
                 gap = rows.query(row, 0)
                 if gap > self._near:
-                    self._least = min(self._least, gap + float(rows.excess[row]))
+                    self._least = min(self._least, gap + rows.excess(row))
+            elif not rows.knows_start(link) and rows.start[row] <= self._near:
+                self._exact_start(link)
             elif not rows.replace(row):
                 if rows.knows_start(link):
                     return
-                distance = rows.distance(link, 0.0).distance_m
-                self._least = min(self._least, distance)
-                self._raise_start(link, distance)
+                self._exact_start(link)
+
+    def _exact_start(self, link: int) -> None:
+        distance = self._rows.distance(link, 0.0).distance_m
+        self._least = min(self._least, distance)
+        self._raise_start(link, distance)
 
     def _raise_start(self, link: int, distance: float) -> None:
         mine = self._rows.link == link
@@ -140,8 +152,9 @@ class ZoneSearch:
     def _certify(self) -> None:
         """Clear every doubtful cell, the earliest first, or find the first contact."""
         rows, s = self._rows, self._path.fractions
+        splits = 0
         for cell in np.flatnonzero((rows.doubt <= self._near).any(axis=0)).tolist():
-            while self._touch is None or s[cell] < self._touch.fraction:
+            while s[cell] < self._touches_at:
                 row = int(np.argmin(rows.doubt[:, cell]))
                 if rows.doubt[row, cell] > self._near:
                     break
@@ -149,38 +162,73 @@ class ZoneSearch:
                     rows.query(row, cell)
                 elif not rows.tried[row, cell + 1]:
                     rows.query(row, cell + 1)
-                elif not rows.replace(row):
+                elif splits < SPLITS and rows.replace(row):
+                    splits += 1
+                else:
                     self._walk(int(rows.link[row]), cell)
 
     def _walk(self, link: int, cell: int) -> None:
-        """Conservative advancement of one link through one cell, up to its first contact."""
-        rows = self._rows
+        """Conservative advancement of one link through one cell, up to its first contact.
+
+        Exact distances begin and end it; in between, rows cut ever smaller give longer steps,
+        for a separating direction proves more than a distance does.
+        """
+        rows, rate = self._rows, float(self._path.rate[link, cell])
         s, end = self._ends(cell)
-        whole = self._touch is None or end <= self._touch.fraction
-        if self._touch is not None:
-            end = min(end, self._touch.fraction)
-        mine = np.flatnonzero((rows.link == link) & (rows.doubt[:, cell] <= self._near))
-        doubtful = [int(row) for row in mine]
-        while doubtful:
+        whole = self._touches_at >= end
+        end = min(end, self._touches_at)
+        doubtful = np.flatnonzero(
+            (rows.link == link) & (rows.doubt[:, cell] <= self._near)
+        ).tolist()
+        walked = set(doubtful)
+        shortest = ratio(self._near - self._target, rate)
+        proven = self._exact_step(link, s, rate)
+        while doubtful and s < end and self._touches_at != s:
             rest = end - s
-            steps = [rows.step(row, cell, s, rest, self._target) for row in doubtful]
-            step = min(steps)
-            if step <= 0.0 or step * self._path.rate[link, cell] < self._near - self._target:
-                nearest = rows.distance(link, s)
-                if nearest.distance_m <= self._near:
-                    self._touch = _Touch(s, link, nearest.point_m)
-                    whole = False
-                    break
-                room = nearest.distance_m - self._target
-                step = max(step, ratio(room, float(self._path.rate[link, cell])))
-            else:
-                doubtful = [row for row, own in zip(doubtful, steps, strict=True) if own < rest]
-            if step >= rest:
+            if proven >= rest:
                 break
-            s += step
-        rows.doubt[mine, cell] = np.inf
-        if whole:
-            rows.bound[mine, cell] = np.maximum(rows.bound[mine, cell], self._zone.margin_m)
+            steps = self._steps(doubtful, cell, s, rest, max(proven, shortest))
+            walked |= steps.keys()
+            doubtful = [row for row, own in steps.items() if own < rest]
+            step = max(proven, min(steps.values()))
+            if step < shortest:
+                step = self._exact_step(link, s, rate)
+            s, proven = s + step, 0.0
+        cleared = list(walked)
+        rows.doubt[cleared, cell] = np.inf
+        if whole and self._touches_at >= end:
+            rows.bound[cleared, cell] = np.maximum(rows.bound[cleared, cell], self._zone.margin_m)
+
+    @property
+    def _touches_at(self) -> float:
+        """Fraction of the earliest contact so far, infinite without one."""
+        return np.inf if self._touch is None else self._touch.fraction
+
+    def _exact_step(self, link: int, s: float, rate: float) -> float:
+        """How far beyond s the exact distance there proves the link clear; 0 in contact."""
+        nearest = self._rows.distance(link, s)
+        if nearest.distance_m <= self._near:
+            self._touch = _Touch(s, link, nearest.point_m)
+            return 0.0
+        return ratio(nearest.distance_m - self._target, rate)
+
+    def _steps(
+        self, doubtful: list[int], cell: int, s: float, rest: float, least: float
+    ) -> dict[int, float]:
+        """Step of each row, rows that cannot make ``least`` cut into smaller ones."""
+        steps: dict[int, float] = {}
+        todo = list(doubtful)
+        splits = 0
+        while todo:
+            row = todo.pop()
+            steps[row] = self._rows.step(row, cell, s, rest, self._target)
+            if steps[row] <= least and steps[row] < rest and splits < SPLITS:
+                halves = self._rows.replace(row)
+                if halves:
+                    splits += 1
+                    del steps[row]
+                    todo += halves
+        return steps
 
     def _clearance_on_the_way(self) -> None:
         """Raise the bounds until the least over the path is within the tolerance of the truth."""
@@ -194,7 +242,7 @@ class ZoneSearch:
             if not rows.tried[row, sample]:
                 gap = rows.query(row, sample)
                 if gap > 0.0:
-                    self._least = min(self._least, gap + float(rows.excess[row]))
+                    self._least = min(self._least, gap + rows.excess(row))
             elif not rows.replace(row):
                 self._sharpen(int(rows.link[row]), cell)
 
@@ -225,6 +273,8 @@ class ZoneSearch:
         rows, margin = self._rows, self._zone.margin_m
         least = float(rows.bound.min())
         now = max(float(rows.start.min()), least) - margin if now_known else None
+        if self._touch is not None and self._touch.fraction == 0.0 and now is not None:
+            now = float(rows.start.min()) - margin  # bounds of the way say nothing of an inside
         proven = done and self._path.end >= 1.0
         worst_row = int(np.unravel_index(np.argmin(rows.bound), rows.bound.shape)[0])
         if self._touch is not None:

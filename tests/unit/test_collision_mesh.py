@@ -14,8 +14,9 @@ from rampe_guard.collision.mesh import (
     load_mesh,
     prism_mesh,
 )
-from rampe_guard.collision.pieces import convex_pieces, hull
+from rampe_guard.collision.pieces import cut, hull, piece_tree
 from rampe_guard.collision.zones import build_zone
+from rampe_guard.core.convex import ConvexPiece
 from rampe_guard.core.scene import Halfspace, Mesh, Sphere
 from rampe_guard.errors import GeometryError
 from tests.support.arms import box_triangles, fork_triangles, write_stl
@@ -115,13 +116,14 @@ def test_round_primitives_contain_what_they_stand_for() -> None:
 @pytest.mark.parametrize("most", [1, 3, 8])
 def test_pieces_contain_every_triangle(most: int) -> None:
     fork = checked_mesh(*_soup(fork_triangles()), "fork")
-    pieces = convex_pieces(fork, 1e-4, most)
+    pieces = [branch.piece for branch in cut(piece_tree(fork, 1e-4, 8, measured=True), most)]
     assert len(pieces) <= most
     rng = np.random.default_rng(1)
     weights = rng.dirichlet([1, 1, 1], size=(len(fork.faces), 5))
     samples = np.einsum("fkc,fcx->fkx", weights, fork.vertices[fork.faces]).reshape(-1, 3)
     held = np.zeros(len(samples), dtype=bool)
     for piece in pieces:
+        assert isinstance(piece, ConvexPiece)
         vertices, faces = hull(piece.vertices)
         a, b, c = np.moveaxis(vertices[faces], 1, 0)
         normal = np.cross(b - a, c - a)
