@@ -119,8 +119,8 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     demo = commands.add_parser("demo", help="everything on this machine, with a live view")
-    demo.add_argument("--cycles", type=_positive_int, default=8, help="work cycles (default 8)")
-    demo.add_argument("--seed", type=int, default=2, help="of the operator's day (default 2)")
+    demo.add_argument("--cycles", type=_positive_int, default=6, help="work cycles (default 6)")
+    demo.add_argument("--seed", type=int, default=13, help="of the operator's day (default 13)")
     demo.set_defaults(command=_demo)
 
     run = commands.add_parser("run", help="the daemon")
