@@ -58,7 +58,11 @@ class FclOracle:
         self._surfaces = [None if m is None else fcl.CollisionObject(fcl_bvh(m)) for m in meshes]
         parts = [() if mesh is None else tuple(mesh.components()) for mesh in meshes]
         self._inner = [np.array([p.vertices[0] for p in own]).reshape(-1, 3) for own in parts]
-        self._closed = [tuple(p for p in own if p.is_watertight()) for own in parts]
+        self._closed = [tuple(_Closed(p) for p in own if p.is_watertight()) for own in parts]
+        self._hollow = [
+            () if solid is None else tuple(_Closed(part) for part in solid.closed)
+            for solid in solids
+        ]
         self._request = fcl.DistanceRequest(enable_nearest_points=True)
 
     def direction(
@@ -117,7 +121,7 @@ class FclOracle:
         if found is not None:
             return _point(solid.inner[found])
         points = apply(pose, self._inner[link])
-        found = _inside(solid.closed, points)
+        found = _inside(self._hollow[zone], points)
         return None if found is None else _point(points[found])
 
     def _touch(self, surface: fcl.CollisionObject, solid: Solid, pose: FloatArray) -> Point:
@@ -149,12 +153,21 @@ def _obstacle(piece: ObstaclePiece) -> fcl.CollisionObject | None:
     return fcl.CollisionObject(fcl_convex(piece.vertices))
 
 
-def _inside(closed: Sequence[TriangleMesh], points: FloatArray) -> int | None:
+class _Closed:
+    """A closed mesh with the box that spares most points the question."""
+
+    def __init__(self, mesh: TriangleMesh) -> None:
+        self.mesh = mesh
+        self.low = mesh.vertices.min(axis=0) - SKIN_M
+        self.high = mesh.vertices.max(axis=0) + SKIN_M
+
+
+def _inside(closed: Sequence[_Closed], points: FloatArray) -> int | None:
     """Index of the first point inside any of the closed meshes."""
-    for mesh in closed:
-        low, high = mesh.vertices.min(axis=0) - SKIN_M, mesh.vertices.max(axis=0) + SKIN_M
-        for index in np.flatnonzero(((points >= low) & (points <= high)).all(axis=1)):
-            if abs(mesh.winding(points[index][None])[0]) > INSIDE:
+    for part in closed:
+        boxed = ((points >= part.low) & (points <= part.high)).all(axis=1)
+        for index in np.flatnonzero(boxed):
+            if abs(part.mesh.winding(points[index][None])[0]) > INSIDE:
                 return int(index)
     return None
 

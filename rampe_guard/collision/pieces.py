@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import fcl
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial import ConvexHull, QhullError
 
 from rampe_guard.collision.mesh import IntArray, TriangleMesh
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 SKIN_M = 1e-5
 """Flat sets of points get this thickness where a hull must have a volume [m]."""
-EXCESS_SAMPLES = 64
+EXCESS_SAMPLES = 40
 MEASURED_SHARE = 8
 """Pieces with less than this part of the leaves are not measured: it takes milliseconds each."""
 INSIDE = 0.3
@@ -47,7 +48,9 @@ def piece_tree(mesh: TriangleMesh, excess_m: float, most: int, *, measured: bool
         piece = replace(piece, excess=min(piece.excess, bulge))
         if leaves < 2 or piece.excess <= excess_m:  # noqa: PLR2004
             return PieceTree(piece)
-        halves = _halves(part, piece)
+        # trying all axes pays off where pieces are large; below, the longest one is near enough
+        order = np.argsort(piece.half)[::-1]
+        halves = _halves(part, piece, order if leaves * MEASURED_SHARE >= most else order[:1])
         if halves is None:
             return PieceTree(piece)
         return PieceTree(piece, tuple(grow(half, leaves // 2, piece.excess) for half in halves))
@@ -162,15 +165,19 @@ def _excess(vertices: FloatArray, whole: TriangleMesh, surface: fcl.CollisionObj
     return 0.0
 
 
-def _halves(mesh: TriangleMesh, piece: ConvexPiece) -> list[TriangleMesh] | None:
-    """Cut across the edge of the piece's box that leaves the least hull volume."""
+def _halves(
+    mesh: TriangleMesh, piece: ConvexPiece, axes: npt.NDArray[np.intp]
+) -> list[TriangleMesh] | None:
+    """Cut across that of some edges of the piece's box that leaves the least hull volume."""
     best: tuple[float, list[TriangleMesh]] | None = None
-    for axis in range(3):
+    for axis in axes:
         along = mesh.vertices[mesh.faces].mean(axis=1) @ piece.rotation[:, axis]
         low = along <= 0.5 * (along.min() + along.max())
         if low.all() or not low.any():
             continue
         halves = [TriangleMesh(mesh.vertices, mesh.faces[side]) for side in (low, ~low)]
+        if len(axes) == 1:
+            return halves
         volume = sum(_volume(half.vertices[np.unique(half.faces)]) for half in halves)
         if best is None or volume < best[0]:
             best = volume, halves

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rampe_guard.collision.urdf import Arm
     from rampe_guard.core.types import FloatArray, SweepResult
 
-LINK_LEAVES = 128
+LINK_LEAVES = 32
 LINK_EXCESS_M = 0.005
 
 

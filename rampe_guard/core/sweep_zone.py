@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rampe_guard.core.sweep_problem import Zone
     from rampe_guard.core.types import Point
 
-SPLITS = 24
+SPLITS = 8
 """Rows that may be cut in a row before exact distances are asked instead."""
 NOISE_M = 1e-6
 """Smaller changes of a distance than this are no motion [m]."""
@@ -98,12 +98,10 @@ class ZoneSearch:
                 gap = rows.query(row, 0)
                 if gap > self._near:
                     self._least = min(self._least, gap + rows.excess(row))
-            elif not rows.knows_start(link) and rows.start[row] <= self._near:
+            elif not rows.knows_start(link):
                 self._exact_start(link)
             elif not rows.replace(row):
-                if rows.knows_start(link):
-                    return
-                self._exact_start(link)
+                return
 
     def _exact_start(self, link: int) -> None:
         distance = self._rows.distance(link, 0.0).distance_m
