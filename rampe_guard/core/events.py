@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from rampe_guard.core.alarm import Level, State
-from rampe_guard.core.types import Category, FloatArray, ZoneSweep
+from rampe_guard.core.types import Category, FloatArray, InputName, ZoneSweep
 
 Source: TypeAlias = Literal["stopping", "intent", "next", "contact", "system"]
 Quality: TypeAlias = Literal["good", "degraded", "stale"]
@@ -99,4 +99,13 @@ class PredictionEvent:
     now_s: float
 
 
-Event: TypeAlias = AlertEvent | PredictionEvent
+@dataclass(frozen=True, slots=True)
+class RefusalEvent:
+    """A sample that the gate refused: which input, a word for it, and its values."""
+
+    input: InputName
+    reason: str
+    detail: str
+
+
+Event: TypeAlias = AlertEvent | PredictionEvent | RefusalEvent

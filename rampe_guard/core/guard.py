@@ -20,6 +20,7 @@ from rampe_guard.core.events import (
     Event,
     Evidence,
     PredictionSummary,
+    RefusalEvent,
     Source,
     SweepSummary,
 )
@@ -33,6 +34,7 @@ from rampe_guard.core.types import (
     ActuatorSample,
     Certificate,
     FloatArray,
+    InputName,
     Inputs,
     JoystickSample,
     PathSweeper,
@@ -96,7 +98,7 @@ class Guard:
         """Take all that arrived since the last step; returns what is to be published."""
         self._monitor.joystick_alive(inputs.joystick_alive)
         for name, reason in inputs.rejected:
-            self._refuse(Rejection(name, reason, ""), now_s)
+            self._refuse(name, reason, now_s)
         events: list[Event] = []
         before = self._newest
         for sample in _in_stamp_order(inputs):
@@ -136,23 +138,24 @@ class Guard:
         if isinstance(sample, JoystickSample):
             lever = self._gate.joystick(sample)
             if isinstance(lever, Rejection):
-                return self._refuse(lever, now_s)
+                self._refuse(lever.input, lever.reason, now_s)
+                return [RefusalEvent(lever.input, lever.reason, lever.detail)]
             self._monitor.accept("joystick", sample.arrival_s)
             self._restart(lever)
             return [*self._intention.joystick(lever.sample, now_s, learn=learn)]
         moved = self._gate.actuators(sample)
         if isinstance(moved, Rejection):
-            return self._refuse(moved, now_s)
+            self._refuse(moved.input, moved.reason, now_s)
+            return [RefusalEvent(moved.input, moved.reason, moved.detail)]
         self._monitor.accept("actuators", sample.arrival_s)
         self._restart(moved)
         self._newest = moved.sample
         self._velocity.update(moved.sample)
         return [*self._intention.actuators(moved.sample, now_s, learn=learn)]
 
-    def _refuse(self, rejection: Rejection, now_s: float) -> list[Event]:
-        self._monitor.reject(rejection.input, rejection.reason, now_s)
+    def _refuse(self, name: InputName, reason: str, now_s: float) -> None:
+        self._monitor.reject(name, reason, now_s)
         self._intention.interrupt()
-        return []
 
     def _restart(self, accepted: Accepted[JoystickSample] | Accepted[ActuatorSample]) -> None:
         if accepted.restarted:

@@ -22,6 +22,9 @@ _AXIS_SLACK = 0.05
 """Joysticks overshoot a little at their ends; more is another unit or another column."""
 _MIN_STEP_S = 0.05
 """Two samples closer than this still may differ by the encoder's last digits and jitter."""
+_BURST_S = 0.2
+_LONG_SLACK = 1.5
+"""Over a longer gap than a burst no actuator keeps up several times its top speed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +87,9 @@ class _Continuity(Generic[S]):
         if speed is None or not isinstance(new, ActuatorSample):
             return None
         moved = np.abs(new.position - old.position)
-        reach = self._config.speed_slack * speed * max(step, _MIN_STEP_S)
+        burst = min(max(step, _MIN_STEP_S), _BURST_S)
+        rest = max(step - _BURST_S, 0.0)
+        reach = speed * (self._config.speed_slack * burst + _LONG_SLACK * rest)
         if (moved > reach).any():
             j = int(np.argmax(moved - reach))
             return Rejection(

@@ -103,6 +103,9 @@ class Worker:
         elif isinstance(event, PredictionEvent):
             self._prediction = self._scribe.prediction(event)
             self._predictions.put(wire.encode(self._prediction))
+        else:
+            kind = f"{event.input}:{event.reason}"
+            self._say.warn(kind, f"{event.input}: refused: {event.reason}: {event.detail}")
 
     def _beat(self, now_s: float) -> None:
         self._pulse.tick += 1

@@ -8,7 +8,7 @@ import pytest
 
 from rampe_guard.core.alarm import Level, State
 from rampe_guard.core.config import ActuatorConfig, GuardConfig, InputConfig, RampeConfig
-from rampe_guard.core.events import SYSTEM_ZONE, AlertEvent, Event, PredictionEvent
+from rampe_guard.core.events import SYSTEM_ZONE, AlertEvent, Event, PredictionEvent, RefusalEvent
 from rampe_guard.core.guard import Guard
 from rampe_guard.core.monitor import Status
 from rampe_guard.core.types import (
@@ -230,6 +230,8 @@ def test_refused_messages_are_counted_and_taint_the_primitive() -> None:
     }
     assert health.status is Status.DEGRADED
     assert rig.guard.rampe.categories == {}
+    (told,) = [e for e in rig.events if isinstance(e, RefusalEvent)]
+    assert told == RefusalEvent("joystick", "axis_out_of_range", "axis 0 is 7")
 
 
 @pytest.mark.parametrize("answer", [Certificate.UNKNOWN])

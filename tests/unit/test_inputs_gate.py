@@ -109,3 +109,12 @@ def test_a_restarted_sender_is_taken_up_after_its_time_out(offset: float) -> Non
     kinds = [isinstance(r, Accepted) for r in results]
     assert kinds == [False] * 5 + [True] * 3
     assert [r.restarted for r in results if isinstance(r, Accepted)] == [True, False, False]
+
+
+def test_an_arm_cannot_jump_over_a_gap_either() -> None:
+    g = gate()
+    g.actuators(arm(1.0, 0.0, 0.2))
+    result = g.actuators(arm(1.8, 3.7, 0.2))
+    assert isinstance(result, Rejection)
+    assert result.reason == "position_jump"
+    assert isinstance(g.actuators(arm(1.9, 0.5, 0.3)), Accepted)
