@@ -64,6 +64,11 @@ class FclOracle:
             for solid in solids
         ]
         self._request = fcl.DistanceRequest(enable_nearest_points=True)
+        # the same once more in long arrays, for the question that spares most of the others
+        self._inner_link = np.repeat(np.arange(len(meshes)), [len(own) for own in self._inner])
+        self._all_inner = np.concatenate([*self._inner, np.zeros((0, 3))])
+        self._link_boxes = np.array([_box(own) for own in self._closed]).reshape(-1, 2, 3)
+        self._zone_boxes = [_box(own) for own in self._hollow]
 
     def direction(
         self, body: int, obstacle: int, pose: FloatArray, *, swapped: bool
@@ -124,6 +129,23 @@ class FclOracle:
         found = _inside(self._hollow[zone], points)
         return None if found is None else _point(points[found])
 
+    def boxed(self, zone: int, poses: FloatArray) -> frozenset[int]:
+        """Links with a point in the box of the zone, or in whose box the zone has a point."""
+        solid = self._solids[zone]
+        if solid is None:
+            return frozenset()
+        rotations, translations = poses[:, :3, :3], poses[:, :3, 3]
+        local = (solid.inner[None] - translations[:, None]) @ rotations
+        low, high = self._link_boxes[:, None, 0], self._link_boxes[:, None, 1]
+        holding = np.all((local >= low) & (local <= high), axis=2)
+        link = self._inner_link
+        points = (rotations[link] @ self._all_inner[:, :, None])[..., 0] + translations[link]
+        low, high = self._zone_boxes[zone]
+        held = np.logical_and(points >= low, points <= high).all(axis=1)
+        return frozenset(np.flatnonzero(np.any(holding, axis=1)).tolist()) | frozenset(
+            link[held].tolist()
+        )
+
     def _touch(self, surface: fcl.CollisionObject, solid: Solid, pose: FloatArray) -> Point:
         """A point of an overlap: where surfaces cross, else a corner of what is inside."""
         result = fcl.CollisionResult()
@@ -160,6 +182,14 @@ class _Closed:
         self.mesh = mesh
         self.low = mesh.vertices.min(axis=0) - SKIN_M
         self.high = mesh.vertices.max(axis=0) + SKIN_M
+
+
+def _box(closed: Sequence[_Closed]) -> FloatArray:
+    """Lowest and highest corner (2, 3) of all; an empty box where there is none."""
+    if not closed:
+        return np.array([np.full(3, np.inf), np.full(3, -np.inf)])
+    low = np.min([part.low for part in closed], axis=0)
+    return np.array([low, np.max([part.high for part in closed], axis=0)])
 
 
 def _inside(closed: Sequence[_Closed], points: FloatArray) -> int | None:

@@ -74,6 +74,7 @@ class FclSweeper:
         *,
         any_path: bool = False,
         clearance: bool = True,
+        only: frozenset[str] | None = None,
     ) -> SweepResult:
         """Sweep from ``start`` (n,) along ``displacement`` (n,), both in actuator units.
 
@@ -83,6 +84,7 @@ class FclSweeper:
             any_path: also ask whether any monotone way to the end could touch.
             clearance: also find how near free zones come; without it they are sooner done and
                 ``clearance_m`` is only what certifying them proved.
+            only: names of the zones that are asked about; None asks about all.
 
         Raises:
             ValueError: if a shape is wrong.
@@ -96,6 +98,7 @@ class FclSweeper:
             displacement,
             clearance=clearance,
             any_path=any_path,
+            only=only,
         )
         return replace(result, elapsed_ms=1e3 * (perf_counter() - begin))
 

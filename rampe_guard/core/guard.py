@@ -172,8 +172,9 @@ class Guard:
         stop_s = max(stopping.stop_s, self._reaction_s)
         evidence: dict[str, list[Evidence]] = {}
         sweeps = []
+        open_zones: frozenset[str] | None = None  # all
         for forecast in forecasts:
-            result = self._sweeper.sweep(q, forecast.displacement, clearance=False)
+            result = self._sweeper.sweep(q, forecast.displacement, clearance=False, only=open_zones)
             if result.certificate is Certificate.UNKNOWN:
                 self._monitor.sweep_unknown(now_s)
             for zone in result.zones:
@@ -181,6 +182,12 @@ class Guard:
                 found = self._rules.judge(forecast, zone, shown, stop_s)
                 evidence.setdefault(zone.zone, []).append(found)
                 sweeps.append(_summary(forecast, zone))
+            # what is imminent already cannot become more urgent by the next forecast
+            open_zones = frozenset(
+                name
+                for name, all_found in evidence.items()
+                if worst(all_found).level < Level.IMMINENT
+            )
         self._sweeps = tuple(sweeps)
         moment = self._moment(self._monitor.health(now_s), now_s)
         alerts = self._annunciator.update({z: worst(e) for z, e in evidence.items()}, moment)

@@ -24,6 +24,8 @@ from rampe_guard.core.sweep_zone import ZoneSearch
 from rampe_guard.core.types import AnyPath, Certificate, SweepResult, ZoneSweep
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rampe_guard.core.config import SweepConfig
     from rampe_guard.core.sweep_problem import ClearanceOracle, SweepProblem
     from rampe_guard.core.types import FloatArray
@@ -42,6 +44,7 @@ def sweep(
     *,
     clearance: bool = True,
     any_path: bool = False,
+    only: frozenset[str] | None = None,
 ) -> SweepResult:
     """Sweep every link against every zone along start + s·displacement, 0 <= s <= 1.
 
@@ -54,10 +57,11 @@ def sweep(
         clearance: also find each free zone's least clearance on the way; else the bound that
             certified it is given, which may be far less.
         any_path: also ask whether any monotone way to the end could touch.
+        only: names of the zones that are asked about; None asks about all.
 
     Returns:
-        One entry per zone. A path that leaves the range in which the drives are proven, or
-        that is not finite, is unknown from there on.
+        One entry per zone asked about. A path that leaves the range in which the drives are
+        proven, or that is not finite, is unknown from there on.
 
     Raises:
         ValueError: if a shape is wrong.
@@ -71,24 +75,31 @@ def sweep(
             f"this arm has {shape[0]} actuators"
         )
     end = valid_end(problem.arm, start, displacement)
+    asked = [i for i, zone in enumerate(problem.zones) if only is None or zone.name in only]
     if end is None:
-        zones = _without_geometry(problem, start, displacement)
+        every = _without_geometry(problem, start, displacement)
+        zones = tuple(every[i] for i in asked)
         return SweepResult(zones=zones, any_path=AnyPath.UNKNOWN if any_path else None)
     budget = Budget(config.max_queries)
     stray_m = STRAY_SHARE * config.clearance_tolerance_m
     path = swept_path(problem.arm, start, displacement, end, stray_m)
     found: dict[int, ZoneSweep] = {}
-    for index, rows in _by_distance(problem, oracle, path, budget):
-        zone = problem.zones[index]
-        if isinstance(zone, Zone):
+    for index, zone, coarse in _by_distance(problem, path, asked):
+        least = float(coarse[0].min())
+        far = least > zone.margin_m + config.tolerance_m and path.end >= 1.0
+        if far and not (clearance or zone.hollow):
+            found[index] = _far(problem, index, zone, coarse, closing=bool(displacement.any()))
+        else:
+            rows = Rows(problem, index, path, oracle, budget, coarse)
             search = ZoneSearch(zone, rows, config, problem.link_names)
             found[index] = search.run(clearance=clearance)
-    for index, zone in enumerate(problem.zones):
-        if not isinstance(zone, Zone):
-            found[index] = sweep_limit(zone, start, displacement)
+    for index in asked:
+        item = problem.zones[index]
+        if not isinstance(item, Zone):
+            found[index] = sweep_limit(item, start, displacement)
         elif index not in found:
-            found[index] = _untouchable(zone.name)
-    result = SweepResult(zones=tuple(found[i] for i in range(len(problem.zones))))
+            found[index] = _untouchable(item.name)
+    result = SweepResult(zones=tuple(found[i] for i in asked))
     if any_path and result.certificate is Certificate.FREE:
         answer = any_monotone_path(problem, oracle, config, start, displacement, budget)
         result = replace(result, any_path=answer)
@@ -99,9 +110,9 @@ def sweep(
 
 
 def _by_distance(
-    problem: SweepProblem, oracle: ClearanceOracle, path: SweptPath, budget: Budget
-) -> list[tuple[int, Rows]]:
-    """Rows of all solid zones with their coarse bounds, the nearest zone first."""
+    problem: SweepProblem, path: SweptPath, asked: Sequence[int]
+) -> list[tuple[int, Zone, tuple[FloatArray, FloatArray]]]:
+    """Solid zones asked about, nearest first, with bounds per row and cell, and at the start."""
     if problem.coarse is None:
         return []
     K = path.cells
@@ -115,11 +126,37 @@ def _by_distance(
     blocks = np.repeat(0.5 * (coarse[:-1] + coarse[1:] - way), np.diff(at), axis=0)
     blocks = np.moveaxis(blocks, 0, -1)
     zones = []
-    for index, table in enumerate(problem.rows):
-        if len(table.body):
-            bounds = blocks[table.body, table.obstacle], coarse[0, table.body, table.obstacle]
-            zones.append((index, Rows(problem, index, path, oracle, budget, bounds)))
-    return sorted(zones, key=lambda item: (float(item[1].bound.min()), item[0]))
+    for index in asked:
+        zone, table = problem.zones[index], problem.rows[index]
+        if isinstance(zone, Zone) and len(table.body):
+            way_of = blocks[table.body, table.obstacle]
+            zones.append((index, zone, (way_of, coarse[0, table.body, table.obstacle])))
+    return sorted(zones, key=lambda item: (float(item[2][0].min()), item[0]))
+
+
+def _far(
+    problem: SweepProblem,
+    index: int,
+    zone: Zone,
+    coarse: tuple[FloatArray, FloatArray],
+    *,
+    closing: bool,
+) -> ZoneSweep:
+    """A zone that the coarse bounds alone prove free, and no link can be inside of."""
+    way, start = coarse
+    least = float(way.min())
+    row = int(np.argmin(way)) // way.shape[1]
+    return ZoneSweep(
+        zone=zone.name,
+        certificate=Certificate.FREE,
+        contact_fraction=None,
+        link=problem.link_names[int(problem.rows[index].link[row])],
+        contact_point_m=None,
+        clearance_m=least - zone.margin_m,
+        clearance_now_m=max(float(start.min()), least) - zone.margin_m,
+        closing=closing,
+        margin_m=zone.margin_m,
+    )
 
 
 def _without_geometry(

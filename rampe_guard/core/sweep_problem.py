@@ -46,6 +46,10 @@ class ClearanceOracle(Protocol):
         """A point of one that lies inside the other while their surfaces are apart."""
         ...
 
+    def boxed(self, zone: int, poses: FloatArray) -> frozenset[int]:
+        """Links that `contained` could say yes to at the poses (L, 4, 4): all others it denies."""
+        ...
+
 
 @dataclass(frozen=True, slots=True)
 class PieceTree:

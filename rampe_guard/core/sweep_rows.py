@@ -186,9 +186,12 @@ class Rows:
         """
         first = slice(0, self._first)
         near = self.link[first] if self._hollow else self.link[first][self.start[first] <= 0.0]
-        for link in sorted(set(near.tolist())):
+        if not near.size:
+            return None
+        poses = self.path.poses(0.0)
+        for link in sorted(self._oracle.boxed(self._zone, poses).intersection(near.tolist())):
             self._budget.spend()
-            point = self._oracle.contained(link, self._zone, self.path.poses(0.0)[link])
+            point = self._oracle.contained(link, self._zone, poses[link])
             if point is not None:
                 return link, point
         return None

@@ -188,9 +188,11 @@ class PathSweeper(Protocol):
         *,
         any_path: bool = False,
         clearance: bool = True,
+        only: frozenset[str] | None = None,
     ) -> SweepResult:
         """Sweep from ``start`` (n,) along ``displacement`` (n,), both in actuator units.
 
-        Without ``clearance``, clearances are proven but need not be sharp.
+        Without ``clearance``, clearances are proven but need not be sharp. With ``only``, the
+        answer is about the zones of these names and no others.
         """
         ...

@@ -50,9 +50,12 @@ class TimedSweeper:
         *,
         any_path: bool = False,
         clearance: bool = True,
+        only: frozenset[str] | None = None,
     ) -> SweepResult:
         """See `PathSweeper.sweep`."""
-        result = self._inner.sweep(start, displacement, any_path=any_path, clearance=clearance)
+        result = self._inner.sweep(
+            start, displacement, any_path=any_path, clearance=clearance, only=only
+        )
         if result.elapsed_ms is not None:
             self._spent.add(result.elapsed_ms)
         return result

@@ -1,10 +1,11 @@
 """How long from a position being put to the alert that it causes? Real processes on loopback.
 
-``python tests/benchmarks/latency.py [--rate 100] [--seconds 20] [--json]``
+``python tests/benchmarks/latency.py [--motion work|edge] [--rate 100] [--seconds 20] [--json]``
 
 A router, a guard of the demo site (20-tonne excavator in the quarry) and this process, which
-sends levers and positions of an arm that swings to and fro at the edge of three zones, so that
-alerts are active or change all the time. An alert carries the stamp of the newest position
+sends levers and positions. ``work`` is the simulated operator, who goes too far in every
+cycle. ``edge`` is the hardest case: an arm that swings to and fro at the edge of three zones,
+so that alerts are active or change all the time. An alert carries the stamp of the newest position
 that it was computed from: latency is its arrival here less the time of that put, so it
 includes both hops over the router, waiting, the sweeps and the JSON.
 
@@ -28,11 +29,16 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
+from rampe_guard.assembly import load_machine
 from rampe_guard.settings import Site, load_site
+from rampe_guard.simulate.machine import build_machine
+from rampe_guard.simulate.quarry import START, quarry_operator
+from rampe_guard.simulate.run import simulate
 from tests.support import processes
 from tests.support.ears import Ears, Heard, open_session
 
 TARGET_P99_MS = 25.0
+WORK_HZ = 200.0
 # actuator: middle, swing to each side [unit], period [s]; speeds stay below the machine's
 MOTION = ((-0.50, 0.50, 4.2), (1.02, 0.14, 4.3), (0.25, 0.12, 3.1), (0.35, 0.12, 2.7))
 
@@ -78,14 +84,36 @@ class Arm:
         return axes, position, velocity
 
 
+class Work:
+    """The simulated operator at work on the demo machine."""
+
+    def __init__(self, site: Site, seconds: float) -> None:
+        operator = quarry_operator(site.guard.actuators, seed=1, overshoot_probability=1.0)
+        limits = load_machine(site).arm.limits
+        machine = build_machine(site.guard.actuators, limits)
+        self._ticks = list(
+            simulate(
+                *(site.guard.actuators, operator, machine, START),
+                rate_hz=WORK_HZ,
+                duration_s=seconds + 1.0,
+            )
+        )
+
+    def at(self, t: float) -> tuple[list[float], list[float], list[float]]:
+        """Axes, position and velocity at ``t`` [s]."""
+        tick = self._ticks[min(int(t * WORK_HZ), len(self._ticks) - 1)]
+        return tick.axes.tolist(), tick.position.tolist(), tick.velocity.tolist()
+
+
 def send(
-    endpoint: str, site: Site, rate_hz: float, seconds: float
+    endpoint: str, site: Site, arm: Arm | Work, rate_hz: float, seconds: float
 ) -> tuple[dict[float, float], list[float]]:
     """Send both inputs; returns the monotonic time of each position's put by its stamp.
 
     And by how much each was late [ms]: how busy the machine is with other things.
     """
-    arm, put_s, late_ms = Arm(site), {}, []
+    put_s: dict[float, float] = {}
+    late_ms: list[float] = []
     session = open_session(endpoint)
     try:
         levers = session.declare_publisher(site.keys.joystick, express=True)
@@ -127,20 +155,21 @@ def _summary(values: np.ndarray) -> dict[str, float]:
     return {"p50": float(p50), "p99": float(p99), "max": float(values.max())}
 
 
-def measure(rate_hz: float, seconds: float) -> Result:
+def measure(motion: str, rate_hz: float, seconds: float) -> Result:
     """Start all, warm up for a second, measure, end all."""
     endpoint, site = processes.free_endpoint(), load_site(processes.DEMO)
+    arm = Arm(site) if motion == "edge" else Work(site, seconds)
     with (
         tempfile.TemporaryDirectory() as folder,
         processes.router(Path(folder), endpoint),
         Ears(endpoint, site.keys.base) as ears,
         processes.guard(Path(folder), processes.DEMO, endpoint) as guard,
     ):
-        send(endpoint, site, rate_hz, 1.0)
+        send(endpoint, site, arm, rate_hz, 1.0)
         time.sleep(site.guard.inputs.actuators_timeout_s + 0.5)  # a new start of the sine
         before = ears.wait("heartbeat", lambda _: True, 5.0, time.monotonic()).body
         used_s, began_s = cpu_s(guard.pid), time.monotonic()
-        put_s, late_ms = send(endpoint, site, rate_hz, seconds)
+        put_s, late_ms = send(endpoint, site, arm, rate_hz, seconds)
         share = (cpu_s(guard.pid) - used_s) / (time.monotonic() - began_s)
         time.sleep(0.5)
         last = ears.wait("heartbeat", lambda _: True, 5.0, time.monotonic()).body
@@ -204,11 +233,12 @@ def _quantiles(of: dict[str, float]) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0] if __doc__ else None)
+    parser.add_argument("--motion", choices=("work", "edge"), default="work")
     parser.add_argument("--rate", type=float, default=100.0, help="of both inputs [Hz]")
     parser.add_argument("--seconds", type=float, default=20.0, help="length of the run [s]")
     parser.add_argument("--json", action="store_true", help="figures as one JSON object")
     args = parser.parse_args()
-    result = measure(args.rate, args.seconds)
+    result = measure(args.motion, args.rate, args.seconds)
     print(json.dumps(asdict(result)) if args.json else table(result))
 
 

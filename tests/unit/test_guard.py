@@ -41,10 +41,13 @@ class Wall:
         *,
         any_path: bool = False,
         clearance: bool = True,
+        only: frozenset[str] | None = None,
     ) -> SweepResult:
         """Closed form."""
         assert not any_path
         assert not clearance
+        if only is not None and "wall" not in only:
+            return SweepResult(())
         edge = self.at - 0.1
         now, way = edge - float(start[0]), float(displacement[0])
         fraction = 0.0 if now <= 0 else now / way if way >= now > 0 else None

@@ -23,8 +23,9 @@ class WallAtOne:
         *,
         any_path: bool = False,
         clearance: bool = True,
+        only: frozenset[str] | None = None,
     ) -> SweepResult:
-        del any_path, clearance
+        del any_path, clearance, only
         a, b = float(start[0]), float(start[0] + displacement[0])
         kind, fraction = Certificate.FREE, None
         if max(a, b) >= 5.0:
