@@ -96,10 +96,9 @@ class _Score:
             elif isinstance(message, wire.Heartbeat):
                 self.loop_ms = message.loop_ms or self.loop_ms
         _check_alive(self.needed)
-        if self.operator.poll() is None:
-            return False
-        self._over_s = self._over_s or time.monotonic()
-        return time.monotonic() - self._over_s > _AFTERMATH_S
+        if self._over_s is None and _gone_home(self.operator):
+            self._over_s = time.monotonic()
+        return self._over_s is not None and time.monotonic() - self._over_s > _AFTERMATH_S
 
     def _position(self, stamp_s: float, position: Sequence[float]) -> None:
         # swept from sample to sample, so a coarser step misses nothing
@@ -123,6 +122,18 @@ def _children() -> Iterator[_Starter]:
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
+            if process.stdout is not None:
+                process.stdout.close()
+
+
+def _gone_home(operator: subprocess.Popen[bytes]) -> bool:
+    """The operator has said that he is done, or is no more."""
+    if operator.poll() is not None:
+        return True
+    if operator.stdout is None:
+        return False
+    os.set_blocking(operator.stdout.fileno(), False)
+    return bool(operator.stdout.read())
 
 
 class _Starter:
@@ -135,7 +146,7 @@ class _Starter:
         process = subprocess.Popen(  # noqa: S603 - our own modules
             [sys.executable, *arguments],
             stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
+            stdout=subprocess.PIPE if name == "operator" else subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             env=environment,
             start_new_session=True,  # Ctrl-C is for this process, which then ends the others

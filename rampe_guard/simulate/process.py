@@ -67,6 +67,7 @@ def main() -> int:
             player = Player(bus, site)
             player.wait_for_listener(stop)
             player.play(_chain(first, work), stop)
+            print("done", flush=True)  # noqa: T201 - whoever started this waits for it
     except RampeGuardError as error:
         print(error, file=sys.stderr)  # noqa: T201
         return 2
