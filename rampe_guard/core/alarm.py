@@ -77,7 +77,6 @@ class Alarm:
         level: the level shown.
         previous: the level shown before the last change.
         state: life-cycle state.
-        raised_s: when it left normal [s].
         changed_s: when the level or state last changed [s].
         number: how many times it was raised.
         acked_by: who acknowledged it, or None.
@@ -92,7 +91,6 @@ class Alarm:
         self.level = Level.CLEAR
         self.previous = Level.CLEAR
         self.state = State.NORMAL
-        self.raised_s = _NEVER
         self.changed_s = _NEVER
         self.number = 0
         self.acked_by: str | None = None
@@ -113,7 +111,7 @@ class Alarm:
         reached = max((lv for lv in Level if self._confirmed(lv)), default=Level.CLEAR)
         if reached > self.level:
             if not self.active:
-                self.raised_s, self.number = now_s, self.number + 1
+                self.number += 1
             self.acked_by = None
             self._show(reached, Trigger.RAISE, now_s)
             return True

@@ -25,9 +25,14 @@ _CALM = Evidence(Level.CLEAR, "system", None, None, None)
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """What every alert of a step has in common."""
+    """What every alert of a step has in common.
+
+    ``machine_s`` is the time that passed by the stamps of the positions [s]. Alarms of zones
+    live by it, so that they do the same live, in replay, and at any speed of replay.
+    """
 
     now_s: float
+    machine_s: float
     stamp_s: float | None
     input_age_s: float | None
     prediction: PredictionSummary | None
@@ -48,6 +53,8 @@ class Annunciator:
         self._alarms: dict[str, Alarm] = {}
         self._evidence: dict[str, Evidence] = {}
         self._published_s: dict[str, float] = {}
+        self._raised_s: dict[str, float] = {}
+        self._changed_s: dict[str, float] = {}
         self._stale = False
         self.seq = 0
 
@@ -83,7 +90,8 @@ class Annunciator:
     def acknowledge(self, alert_id: str, who: str, moment: Moment) -> list[AlertEvent]:
         """Acknowledge an alert by its id; empty if there is none of that id to acknowledge."""
         for zone, alarm in self._alarms.items():
-            if self._id(zone) == alert_id and alarm.acknowledge(who, moment.now_s):
+            if self._id(zone) == alert_id and alarm.acknowledge(who, _clock(zone, moment)):
+                self._changed_s[zone] = moment.now_s
                 return [self._event(zone, "transition", moment)]
         return []
 
@@ -100,12 +108,15 @@ class Annunciator:
             self._alarms[zone] = alarm
         if found.sweep is not None and found.sweep.touching and found.level:
             alarm.latched = True
-        was_active = alarm.active
-        changed = alarm.step(found.level, moment.now_s)
+        was_active, number = alarm.active, alarm.number
+        changed = alarm.step(found.level, _clock(zone, moment))
+        if alarm.number != number:
+            self._raised_s[zone] = moment.now_s
         # between cause and release the alert goes on telling of its last cause
         if found.level >= alarm.level or zone not in self._evidence:
             self._evidence[zone] = found
         if changed:
+            self._changed_s[zone] = moment.now_s
             event = self._event(zone, "transition", moment)
             if not alarm.active:
                 alarm.latched = zone == SYSTEM_ZONE
@@ -142,8 +153,8 @@ class Annunciator:
             stamp_s=moment.stamp_s,
             now_s=moment.now_s,
             input_age_s=moment.input_age_s,
-            raised_s=alarm.raised_s,
-            changed_s=alarm.changed_s,
+            raised_s=self._raised_s[zone],
+            changed_s=self._changed_s[zone],
             acked_by=alarm.acked_by,
         )
 
@@ -152,3 +163,7 @@ class Annunciator:
             return "stale"
         unknown = found.sweep is not None and found.sweep.certificate is Certificate.UNKNOWN
         return "degraded" if moment.degraded or unknown else "good"
+
+
+def _clock(zone: str, moment: Moment) -> float:
+    return moment.now_s if zone == SYSTEM_ZONE else moment.machine_s

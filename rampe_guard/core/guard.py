@@ -87,6 +87,7 @@ class Guard:
         self._rules = LevelRules(alerts)
         self._annunciator = Annunciator(alerts, boot_id)
         self._newest: ActuatorSample | None = None
+        self._machine_s = 0.0
         self._sweeps: tuple[SweepSummary, ...] = ()
 
     @property
@@ -149,6 +150,8 @@ class Guard:
             return [RefusalEvent(moved.input, moved.reason, moved.detail)]
         self._monitor.accept("actuators", sample.arrival_s)
         self._restart(moved)
+        if self._newest is not None and not moved.restarted:
+            self._machine_s += moved.sample.stamp_s - self._newest.stamp_s
         self._newest = moved.sample
         self._velocity.update(moved.sample)
         return [*self._intention.actuators(moved.sample, now_s, learn=learn)]
@@ -197,6 +200,7 @@ class Guard:
         newest = self._newest
         return Moment(
             now_s=now_s,
+            machine_s=self._machine_s,
             stamp_s=None if newest is None else newest.stamp_s,
             input_age_s=health.ages_s["actuators"],
             prediction=None if newest is None else self._intention.summary(newest.position),
