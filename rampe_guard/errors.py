@@ -7,6 +7,7 @@
     ├── GeometryError        a URDF, mesh or linkage that cannot be used: file and reason
     ├── MessageError         a message that breaks the contract: key and reason
     ├── LogError             a recording that cannot be replayed: file, line, column
+    ├── InterruptedReplayError  a replay was stopped before its end: no score
     └── ConnectionFailedError  no router answered, or the session was refused
 
 Each is printed to a user as one message without a traceback, and ends a command with exit
@@ -42,6 +43,10 @@ class MessageError(RampeGuardError):
 
 class LogError(RampeGuardError):
     """A recording cannot be replayed; the message names file, line or column, and why."""
+
+
+class InterruptedReplayError(RampeGuardError):
+    """A replay was stopped before its end; half a replay has no score."""
 
 
 class ConnectionFailedError(RampeGuardError):

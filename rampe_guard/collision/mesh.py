@@ -24,6 +24,10 @@ ROUND_SIDES = 48
 """Sides of the prism that stands for a round link primitive."""
 
 
+_LEAST_FILL = 1e-6
+"""Share of its box that a closed mesh must fill to count as a solid."""
+
+
 @dataclass(frozen=True, slots=True)
 class TriangleMesh:
     """A checked mesh: finite vertices (v, 3) [m], faces (f, 3) with distinct corners, f >= 1."""
@@ -60,6 +64,21 @@ class TriangleMesh:
         forth = np.sort(edges[:, 0] * count + edges[:, 1])
         back = np.sort(edges[:, 1] * count + edges[:, 0])
         return bool((forth == back).all() and (np.diff(forth) > 0).all())
+
+    def is_closed(self) -> bool:
+        """Whether inside and outside can be told apart, touching edges allowed.
+
+        Every edge is walked as often one way as the other, and there is a volume: a skin and
+        its mirror image cancel and enclose nothing.
+        """
+        edges = self.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+        count = len(self.vertices)
+        forth = np.sort(edges[:, 0] * count + edges[:, 1])
+        back = np.sort(edges[:, 1] * count + edges[:, 0])
+        a, b, c = (self.vertices[self.faces] - self.vertices.mean(axis=0)).transpose(1, 0, 2)
+        volume = abs(float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum())) / 6.0
+        box = float(np.prod(np.ptp(self.vertices, axis=0)))
+        return bool((forth == back).all()) and volume > _LEAST_FILL * box
 
     def winding(self, points: FloatArray) -> FloatArray:
         """Winding number of points (n, 3): ±1 inside a watertight mesh, 0 outside."""

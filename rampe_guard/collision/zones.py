@@ -141,7 +141,13 @@ def _mesh(item: Mesh) -> Built:
     pieces = tuple(cut(tree, MESH_PIECES))
     parts = mesh.components()
     inner = np.array([part.vertices[0] for part in parts])
-    closed = tuple(part for part in parts if part.is_watertight())
+    closed = tuple(part for part in parts if part.is_closed())
+    if len(closed) < len(parts):
+        raise GeometryError(
+            f"object '{item.name}': {item.file}: {len(parts) - len(closed)} of {len(parts)} parts"
+            " are not closed (an edge is open, or a triangle is turned over), so inside"
+            " and outside cannot be told apart; close the mesh, or use boxes"
+        )
     return pieces, Solid(fcl.CollisionObject(fcl_bvh(mesh)), 0.0, inner, closed)
 
 

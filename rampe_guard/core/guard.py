@@ -227,7 +227,7 @@ def _summary(forecast: Forecast, zone: ZoneSweep) -> SweepSummary:
 
 
 def _system_evidence(health: Health) -> Evidence:
-    if health.status is not Status.NOT_MONITORING:
+    if health.status is not Status.NOT_MONITORING or health.starting:
         return Evidence(Level.CLEAR, "system", None, None, None)
     note = "; ".join(r.text for r in health.reasons)
     return Evidence(Level.WARNING, "system", None, None, None, note)

@@ -41,13 +41,17 @@ class Reason:
 
 @dataclass(frozen=True, slots=True)
 class Health:
-    """Status with its reasons, and the age of the newest good sample of each input [s]."""
+    """Status with its reasons, and the age of the newest good sample of each input [s].
+
+    ``starting``: not monitoring only because the first samples may still be on their way.
+    """
 
     status: Status
     reasons: tuple[Reason, ...]
     ages_s: dict[InputName, float | None]
     accepted: dict[InputName, int]
     rejected: dict[tuple[InputName, str], int]
+    starting: bool = False
 
 
 class InputMonitor:
@@ -111,7 +115,15 @@ class InputMonitor:
             name: None if last is None else max(now_s - last, 0.0)
             for name, last in self._last_s.items()
         }
-        return Health(status, (*blind, *weak), ages, dict(self._accepted), dict(self._rejected))
+        limit = max(self._config.joystick_timeout_s, self._config.actuators_timeout_s)
+        return Health(
+            status,
+            (*blind, *weak),
+            ages,
+            dict(self._accepted),
+            dict(self._rejected),
+            starting=bool(blind) and not self._accepted and now_s - self._start_s <= limit,
+        )
 
     def _joystick(self, now_s: float) -> Reason | None:
         if self._joystick_alive is False:
@@ -125,10 +137,10 @@ class InputMonitor:
         if name == "actuators":
             limit = self._config.actuators_timeout_s
         last = self._last_s[name]
-        if now_s - (self._start_s if last is None else last) <= limit:
-            return None
         if last is None:
             return Reason(f"{name}_silent", name, f"no good {name} message yet")
+        if now_s - last <= limit:
+            return None
         return Reason(f"{name}_silent", name, f"no good {name} message for more than {limit:g} s")
 
     def _weaknesses(self, now_s: float) -> list[Reason]:

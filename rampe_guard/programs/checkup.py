@@ -10,6 +10,7 @@ from rich.text import Text
 from rampe_guard.assembly import Machine, load_machine
 from rampe_guard.core.scene import ActuatorLimit, SceneObject
 from rampe_guard.core.types import FloatArray
+from rampe_guard.runtime.zenoh_io import check_configuration
 from rampe_guard.settings import Site, load_site
 
 
@@ -20,6 +21,7 @@ def checkup(site_path: str, console: Console) -> int:
         SettingsError, GeometryError: what is wrong, and where.
     """
     site = load_site(site_path)
+    check_configuration(site.zenoh)
     machine = load_machine(site)
     pose = resting_pose(machine.arm.limits)
     console.print(Text(f"{site.machine} at {site.name}", "bold"), Text(f"  {site.path}", "dim"))
@@ -84,7 +86,9 @@ def _links(machine: Machine) -> Table:
 
 
 def _zones(machine: Machine, pose: FloatArray) -> Table:
-    table = _table("zones, with the arm in the middle of its travel", "name", "type", "margin", "")
+    table = _table(
+        "zones, with the arm in the middle of its travel", "name", "type", "margin", "clearance"
+    )
     swept = {z.zone: z for z in machine.sweeper.sweep(pose, np.zeros_like(pose)).zones}
     for zone in machine.site.scene.objects:
         found = swept[zone.name]
@@ -115,4 +119,8 @@ def _remarks(machine: Machine) -> list[str]:
     ]
     if bare:
         remarks.append(f"links without geometry are not swept: {', '.join(bare)}")
+    for zone in machine.site.scene.objects:
+        ignored = () if isinstance(zone, ActuatorLimit) else zone.ignore_links
+        if ignored and set(ignored) >= set(machine.arm.link_names) - set(bare):
+            remarks.append(f"zone {zone.name!r} ignores every link: it can never warn")
     return remarks

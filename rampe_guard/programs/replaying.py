@@ -10,7 +10,7 @@ from rich.console import Console
 from rampe_guard import wire
 from rampe_guard.assembly import load_machine
 from rampe_guard.core.events import SYSTEM_ZONE, AlertEvent
-from rampe_guard.errors import ConnectionFailedError
+from rampe_guard.errors import ConnectionFailedError, InterruptedReplayError
 from rampe_guard.evaluate.tally import Tally
 from rampe_guard.programs.scoring import closing_table
 from rampe_guard.runtime.connecting import connect_to
@@ -33,6 +33,7 @@ def replay_offline(
 
     Raises:
         LogError: the log cannot be what the site file says.
+        InterruptedReplayError: it was told to stop before the end.
     """
     site = load_site(site_path)
     machine = load_machine(site)
@@ -41,11 +42,12 @@ def replay_offline(
     scribe = Scribe(site, BOOT_ID, lambda now_s: now_s)
     tally = Tally(machine.sweeper, machine.sweeper.zones)
     for t, q in zip(log.time_s.tolist(), log.position, strict=True):
-        if not stop():
-            tally.position(t, q)
+        if stop():
+            raise InterruptedReplayError("interrupted: no score")
+        tally.position(t, q)
     for now_s, events in replay(guard, log):
         if stop():
-            break
+            raise InterruptedReplayError("interrupted: the alerts are not complete, no score")
         for event in events:
             if not isinstance(event, AlertEvent):
                 continue

@@ -6,8 +6,13 @@ from collections.abc import Iterable, Iterator
 
 from rampe_guard import wire
 from rampe_guard.assembly import Sweeper
+from rampe_guard.core.types import Certificate
 from rampe_guard.errors import MessageError
 from rampe_guard.settings import load_site
+
+_OUT_OF_REACH = (
+    "start or way leaves the range in which the drives are proven, or the budget was spent"
+)
 
 
 def sweep_lines(site_path: str, lines: Iterable[bytes]) -> Iterator[bytes]:
@@ -34,6 +39,7 @@ def sweep_lines(site_path: str, lines: Iterable[bytes]) -> Iterator[bytes]:
                 clearance_m=result.clearance_m,
                 any_path=None if result.any_path is None else result.any_path.value,
                 elapsed_ms=result.elapsed_ms,
+                error=_OUT_OF_REACH if result.certificate is Certificate.UNKNOWN else None,
             )
         )
 

@@ -22,6 +22,7 @@ from rampe_guard.settings import ColumnMap, Site
 _WRONG_SHARE = 0.02
 """More impossible rows than this in one column is no glitch."""
 _AXIS_LIMIT = 1.05
+_FASTEST_S, _SLOWEST_S = 0.0005, 1.0
 _CLEAR_COMMAND = 0.4
 _AGAINST_SHARE = 0.6
 
@@ -120,7 +121,7 @@ def _check(site: Site, log: CsvLog, limits: FloatArray) -> None:
     mapping = site.log
     if mapping is None:
         return
-    problems = []
+    problems = _time_problems(mapping.time, log.time_s)
     slack = site.guard.inputs.position_slack
     for j, actuator in enumerate(site.guard.actuators):
         name = actuator.name
@@ -138,6 +139,28 @@ def _check(site: Site, log: CsvLog, limits: FloatArray) -> None:
             f"{log.path}: this cannot be what the site file's 'log' says:\n  {text}\n"
             f"  Are columns swapped, or is a scale wrong? Nothing was learned from it."
         )
+
+
+def _time_problems(column: ColumnMap, time_s: FloatArray) -> list[str]:
+    steps = np.diff(time_s)
+    back = np.flatnonzero(steps <= 0.0)
+    if back.size:
+        at = int(back[0])
+        return [
+            (
+                f"column {column.column!r}: time does not go on after {time_s[at]:.6g} s"
+                f" (row {at + 2} of the usable ones): two runs in one file? Split it"
+            )
+        ]
+    typical = float(np.median(steps)) if steps.size else _SLOWEST_S
+    if not _FASTEST_S <= typical <= _SLOWEST_S:
+        return [
+            (
+                f"column {column.column!r}: rows are {typical:.3g} s apart: is time in seconds?"
+                " Give its scale"
+            )
+        ]
+    return []
 
 
 def _outside(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rampe_guard.assembly import load_machine
-from rampe_guard.errors import SettingsError
+from rampe_guard.errors import ConnectionFailedError, SettingsError
 from rampe_guard.runtime.connecting import connect_to
 from rampe_guard.runtime.say import Sayer
 from rampe_guard.runtime.stopping import StopFlag
@@ -35,6 +35,11 @@ def run(site_path: str, endpoints: Sequence[str], stop: StopFlag) -> int:
     if bus is None:
         return 0
     with bus:
+        if bus.is_alive(f"{site.keys.base}/alive"):
+            raise ConnectionFailedError(
+                f"another guard already publishes under {site.keys.base}; stop it, or give this"
+                " machine a base key of its own"
+            )
         worker = Worker(machine, bus, say)
         say.info(f"guarding on {site.keys.base}")
         worker.run(stop, stop.wait)

@@ -204,6 +204,11 @@ class Bus:
         """Watch the liveliness token on a key."""
         return Liveness(self._session, key)
 
+    def is_alive(self, key: str) -> bool:
+        """Whether anybody holds a liveliness token on a key now."""
+        replies = self._session.liveliness().get(key, timeout=1.0)
+        return any(reply.ok is not None for reply in replies)
+
     def declare_alive(self, key: str) -> None:
         """Hold a liveliness token on a key for as long as the session lives."""
         self._kept.append(self._session.liveliness().declare_token(key))
@@ -260,12 +265,29 @@ def router(endpoints: Sequence[str]) -> Iterator[None]:
         session.close()
 
 
+def check_configuration(settings: ZenohSettings) -> None:
+    """See whether a session could be configured so, without opening one.
+
+    Raises:
+        SettingsError: it could not.
+    """
+    _config(settings)
+
+
 def _config(settings: ZenohSettings) -> zenoh.Config:
+    try:
+        return _unchecked_config(settings)
+    except (zenoh.ZError, ValueError) as error:
+        where = settings.config or f"endpoints {', '.join(settings.connect)!r}"
+        reason = str(error).split(" at /")[0].splitlines()[0]
+        raise SettingsError(
+            f"zenoh: {where}: {reason}; endpoints look like tcp/127.0.0.1:7447"
+        ) from None
+
+
+def _unchecked_config(settings: ZenohSettings) -> zenoh.Config:
     if settings.config is not None:
-        try:
-            config = zenoh.Config.from_file(settings.config)
-        except zenoh.ZError as error:
-            raise SettingsError(f"{settings.config}: not a Zenoh configuration: {error}") from None
+        config = zenoh.Config.from_file(settings.config)
     else:
         config = _blank(settings.mode)
         config.insert_json5("connect/endpoints", json.dumps(list(settings.connect)))

@@ -202,7 +202,7 @@ def _alert(message: Alert, zone: str, before: AlertView | None, now_s: float) ->
 
 def _came_true(alert: AlertView, published_unix_s: float) -> str:
     if alert.warned_unix_s is None:
-        return f"{alert.zone}: entered WITHOUT A WARNING"
+        return f"{alert.zone}: inside the margin"
     return f"{alert.zone}: entered; warned {published_unix_s - alert.warned_unix_s:.2f} s ahead"
 
 

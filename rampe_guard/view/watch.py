@@ -58,5 +58,6 @@ def _lines(
                 break
             new.append(event)
         for event in reversed(new):
-            console.print(f"{event.level.word:9} {event.text}", markup=False, highlight=False)
+            line = f"{event.level.word:9} {event.text}"
+            console.print(line, markup=False, highlight=False, soft_wrap=True)
             last = event

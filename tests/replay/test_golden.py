@@ -8,6 +8,9 @@ When a change of behaviour is meant, look at what differs, then write the file a
 import json
 from pathlib import Path
 
+import pytest
+
+from rampe_guard.errors import InterruptedReplayError
 from rampe_guard.programs.replaying import replay_offline
 from rampe_guard.resources import shipped_site
 from rampe_guard.runtime.stopping import StopFlag
@@ -45,6 +48,14 @@ def test_the_golden_run_is_worth_its_name() -> None:
     golden = json.loads(GOLDEN.read_text())
     levels = {row[2] for row in golden if row[1] == "wall"}
     assert {"clear", "imminent"} <= levels
+
+
+def test_an_interrupted_replay_has_no_score(capsys: pytest.CaptureFixture[str]) -> None:
+    stop = StopFlag()
+    stop.set()
+    with pytest.raises(InterruptedReplayError):
+        list(replay_offline(str(shipped_site("demo")), str(LOG), stop, repeats=False))
+    assert capsys.readouterr().err == ""
 
 
 if __name__ == "__main__":

@@ -112,3 +112,15 @@ def test_no_rows_no_file_no_mapping(site: Site, tmp_path: Path) -> None:
     (tmp_path / "b.csv").write_bytes(b"\xff\xfe\x00\x01")
     assert "cannot be read" in refusal(site, tmp_path / "b.csv")
     assert "no 'log' mapping" in refusal(replace(site, log=None), tmp_path / "a.csv")
+
+
+def test_two_runs_in_one_file_are_refused(site: Site, tmp_path: Path) -> None:
+    text = refusal(site, write(tmp_path / "a.csv", rows(100) + rows(100)))
+    assert "time does not go on after 4.95 s" in text
+
+
+def test_time_in_milliseconds_is_refused(site: Site, tmp_path: Path) -> None:
+    data = [[row[0] * 1000.0, *row[1:]] for row in rows()]
+    assert "rows are 50 s apart: is time in seconds?" in refusal(
+        site, write(tmp_path / "a.csv", data)
+    )

@@ -103,3 +103,12 @@ def test_an_unanswered_sweep_is_told() -> None:
     monitor = fed()
     monitor.sweep_unknown(1.0)
     assert codes(monitor, 1.1) == ["sweep_unknown"]
+
+
+def test_before_the_first_data_nothing_is_monitored_but_no_fault_is_told_yet() -> None:
+    monitor = InputMonitor(InputConfig(), start_s=0.0)
+    first = monitor.health(0.01)
+    assert (first.status, first.starting) == (Status.NOT_MONITORING, True)
+    assert not monitor.health(0.6).starting
+    monitor.accept("joystick", 0.1)
+    assert not monitor.health(0.2).starting

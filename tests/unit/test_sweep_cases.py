@@ -11,7 +11,8 @@ import pytest
 from rampe_guard.collision import FclSweeper, load_arm
 from rampe_guard.core.drive import CylinderDrive, Drive, FourBarDrive, joint_scalar
 from rampe_guard.core.scene import Box, Capsule, Cylinder, Halfspace, Mesh, Scene, Sphere
-from rampe_guard.core.types import Certificate, ZoneSweep
+from rampe_guard.core.types import Certificate, FloatArray, ZoneSweep
+from rampe_guard.errors import GeometryError
 from tests.support.arms import box_triangles, pendulum, slider, write_stl
 from tests.support.scenes import pose
 
@@ -115,14 +116,43 @@ def test_obstacle_wholly_inside_a_link(tmp_path: Path) -> None:
     assert zone.contact_fraction == 0.0
 
 
-def test_an_open_mesh_is_a_surface_without_inside(tmp_path: Path) -> None:
-    """A box without its lid, the link in it: no contact until it meets a wall."""
-    open_box = box_triangles((5, 5, 5))
-    lid = (open_box[:, :, 2] > 0).all(axis=1)
-    file = str(write_stl(tmp_path / "open.stl", open_box[~lid]))
+def damaged(kind: str) -> FloatArray:
+    box = box_triangles((5, 5, 5))
+    if kind == "a triangle is missing":
+        return box[1:]
+    if kind == "a triangle is turned over":
+        return np.concatenate([box[:1, ::-1], box[1:]])
+    if kind == "a sheet":
+        return box[:2]
+    return np.concatenate([box, box[:, ::-1]])
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "a triangle is missing",
+        "a triangle is turned over",
+        "a sheet",
+        "a skin and its mirror image",
+    ],
+)
+def test_a_mesh_whose_inside_cannot_be_known_is_refused(tmp_path: Path, kind: str) -> None:
+    """The link would be inside, touch nothing, and be called free."""
+    file = str(write_stl(tmp_path / "open.stl", damaged(kind)))
     item = Mesh(name="pit", margin_m=0, file=file, scale=1.0, pose=np.eye(4))
-    assert sweep_one(slider(tmp_path), item, 0.0, 1.0).certificate is Certificate.FREE
-    assert_contact_at(sweep_one(slider(tmp_path), item, 0.0, 4.0), 2.4 / 4.0, 4.0)
+    with pytest.raises(
+        GeometryError, match=r"object 'pit': .*open\.stl: 1 of 1 parts are not closed"
+    ):
+        sweep_one(slider(tmp_path), item, 0.0, 1.0)
+
+
+def test_boxes_that_touch_along_an_edge_are_closed_and_solid(tmp_path: Path) -> None:
+    """One box round the link, another that shares its edge: the merged edge is walked twice."""
+    around, beside = box_triangles((5, 5, 5)), box_triangles((5, 5, 5), (5, 5, 0))
+    file = str(write_stl(tmp_path / "two.stl", np.concatenate([around, beside])))
+    item = Mesh(name="two", margin_m=0, file=file, scale=1.0, pose=np.eye(4))
+    zone = sweep_one(slider(tmp_path), item, 0.0, 1.0)
+    assert (zone.certificate, zone.contact_fraction) == (Certificate.CONTACT, 0.0)
 
 
 @pytest.mark.parametrize("kind", ["box", "sphere", "cylinder", "capsule", "halfspace", "mesh"])

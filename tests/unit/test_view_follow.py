@@ -219,10 +219,10 @@ def test_a_contact_tells_the_lead_of_its_warning_once() -> None:
 
 def test_a_contact_without_a_warning_says_so() -> None:
     state = alerts({"level": "imminent", "source": "contact"})
-    assert texts(state) == ["wall: entered WITHOUT A WARNING"]
+    assert texts(state) == ["wall: inside the margin"]
     # A caution long before is no warning.
     state = alerts({"level": "caution"}, {"level": "imminent", "source": "contact"})
-    assert texts(state)[0] == "wall: entered WITHOUT A WARNING"
+    assert texts(state)[0] == "wall: inside the margin"
 
 
 def test_quality_state_and_system_alerts_are_kept() -> None:
