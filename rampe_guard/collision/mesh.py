@@ -59,10 +59,7 @@ class TriangleMesh:
 
     def is_watertight(self) -> bool:
         """Whether every edge is walked once each way, so that inside and outside are told apart."""
-        edges = self.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-        count = len(self.vertices)
-        forth = np.sort(edges[:, 0] * count + edges[:, 1])
-        back = np.sort(edges[:, 1] * count + edges[:, 0])
+        forth, back = self._walks()
         return bool((forth == back).all() and (np.diff(forth) > 0).all())
 
     def is_closed(self) -> bool:
@@ -71,14 +68,18 @@ class TriangleMesh:
         Every edge is walked as often one way as the other, and there is a volume: a skin and
         its mirror image cancel and enclose nothing.
         """
-        edges = self.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-        count = len(self.vertices)
-        forth = np.sort(edges[:, 0] * count + edges[:, 1])
-        back = np.sort(edges[:, 1] * count + edges[:, 0])
+        forth, back = self._walks()
         a, b, c = (self.vertices[self.faces] - self.vertices.mean(axis=0)).transpose(1, 0, 2)
         volume = abs(float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum())) / 6.0
         box = float(np.prod(np.ptp(self.vertices, axis=0)))
         return bool((forth == back).all()) and volume > _LEAST_FILL * box
+
+    def _walks(self) -> tuple[IntArray, IntArray]:
+        """All directed edges as numbers, and the same edges walked backwards, both sorted."""
+        edges = self.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+        count = len(self.vertices)
+        forth = np.sort(edges[:, 0] * count + edges[:, 1])
+        return forth, np.sort(edges[:, 1] * count + edges[:, 0])
 
     def winding(self, points: FloatArray) -> FloatArray:
         """Winding number of points (n, 3): ±1 inside a watertight mesh, 0 outside."""

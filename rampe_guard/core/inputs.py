@@ -18,7 +18,7 @@ from rampe_guard.core.types import ActuatorSample, FloatArray, InputName, Joysti
 
 S = TypeVar("S", JoystickSample, ActuatorSample)
 
-_AXIS_SLACK = 0.05
+AXIS_SLACK = 0.05
 """Joysticks overshoot a little at their ends; more is another unit or another column."""
 _MIN_STEP_S = 0.05
 """Two samples closer than this still may differ by the encoder's last digits and jitter."""
@@ -135,7 +135,7 @@ class InputGate:
         if not (np.isfinite(axes).all() and np.isfinite(sample.stamp_s)):
             return Rejection("joystick", "not_finite", f"axes {axes.tolist()}")
         size = np.abs(axes)
-        if (size > 1.0 + _AXIS_SLACK).any():
+        if (size > 1.0 + AXIS_SLACK).any():
             j = int(np.argmax(size))
             return Rejection("joystick", "axis_out_of_range", f"axis {j} is {axes[j]:.4g}")
         clipped = replace(sample, axes=np.clip(axes, -1.0, 1.0))

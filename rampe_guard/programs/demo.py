@@ -13,7 +13,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from rich.console import Console
@@ -83,7 +83,7 @@ class _Score:
     needed: Sequence[subprocess.Popen[bytes]]
     loop_ms: wire.Quantiles | None = None
     _last_s: float = float("-inf")
-    _over_s: float | None = field(default=None)
+    _over_s: float | None = None
 
     def take(self, heard: list[Heard]) -> bool:
         """Score what was heard; True when the operator has gone and all is said."""
@@ -142,7 +142,7 @@ class _Starter:
 
     def __call__(self, name: str, arguments: Sequence[str]) -> subprocess.Popen[bytes]:
         # one thread each: the maths is small, and the cores are shared
-        environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "RAMPE_GUARD_PART": name}
+        environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
         process = subprocess.Popen(  # noqa: S603 - our own modules
             [sys.executable, *arguments],
             stdin=subprocess.DEVNULL,

@@ -15,13 +15,14 @@ from pathlib import Path
 
 import numpy as np
 
+from rampe_guard.core.inputs import AXIS_SLACK
 from rampe_guard.core.types import ActuatorSample, FloatArray, JoystickSample
 from rampe_guard.errors import LogError
 from rampe_guard.settings import ColumnMap, Site
 
 _WRONG_SHARE = 0.02
 """More impossible rows than this in one column is no glitch."""
-_AXIS_LIMIT = 1.05
+_AXIS_LIMIT = 1.0 + AXIS_SLACK
 _FASTEST_S, _SLOWEST_S = 0.0005, 1.0
 _CLEAR_COMMAND = 0.4
 _AGAINST_SHARE = 0.6

@@ -10,6 +10,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
+from rampe_guard.core.inputs import AXIS_SLACK
 from rampe_guard.errors import MessageError
 from rampe_guard.wire.codec import MAX_PAYLOAD_BYTES, Message, decode
 
@@ -17,8 +18,6 @@ MAX_VALUE = 1e6
 """Larger positions, velocities and axes are rubbish; their differences might overflow."""
 MAX_STAMP_S = 1e12
 """Larger stamps are milli- or nanoseconds."""
-AXIS_SLACK = 0.05
-"""How far beyond ±1 an axis may read before it is a fault instead of calibration."""
 _MAX_AXES = 64
 
 _Stamp = Annotated[
