@@ -1,0 +1,213 @@
+"""Does RAMPE know what it does not know? Coverage of its intervals, reliability of its odds.
+
+Two questions about the predictive distribution of the site's RAMPE:
+
+* coverage: how often does the displacement lie in the central 50 % and 90 % interval that was
+  given at the start of a primitive?
+* reliability: while a primitive is under way with progress p, what is the chance that it will
+  pass d > p, and how often does it? This is the probability that alerts are made of.
+
+Both are asked about the actuators that the category moves, and only where there is a forecast.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.special import stdtr, stdtrit
+
+from rampe_guard.core.rampe import DisplacementForecast
+from rampe_guard.core.types import Category, FloatArray
+from rampe_guard.evaluate.forecasters import SiteRampe
+from rampe_guard.evaluate.segments import Segment
+
+LEVELS = (0.5, 0.9)
+AHEAD = (0.05, 0.1, 0.2, 0.3, 0.5)
+"""Distances ahead of the progress that are asked about [share of the range]."""
+SPACING_S = 0.1
+"""Samples of one primitive that are asked lie at least this far apart [s]."""
+BINS = 10
+_SLACK_S = 1e-9
+"""Stamps 0.1 s apart may differ by less in floating point."""
+
+
+@dataclass(frozen=True, slots=True)
+class Foretold:
+    """A primitive and the distribution that was forecast for it, None if there was none.
+
+    ``seen`` counts occurrences of the category before.
+    """
+
+    segment: Segment
+    forecast: DisplacementForecast | None
+    seen: int
+
+
+def foretell(
+    runs: Sequence[Sequence[Segment]], model: Callable[[], SiteRampe], *, fresh: bool
+) -> list[Foretold]:
+    """Walk through all runs: predict, then learn; a new model for each run if ``fresh``."""
+    learner, seen = model(), Counter[Category]()
+    found = []
+    for index, segments in enumerate(runs):
+        if fresh and index:
+            learner, seen = model(), Counter[Category]()
+        for segment in segments:
+            category = segment.start.category
+            found.append(Foretold(segment, learner.forecast(segment.start), seen[category]))
+            learner.observe(segment)
+            seen[category] += 1
+    return found
+
+
+def quantile(forecast: DisplacementForecast, p: float) -> FloatArray:
+    """p-quantile of the signed displacement (n,) [unit]."""
+    result: FloatArray = forecast.mean + forecast.scale * stdtrit(forecast.dof, p)
+    return result
+
+
+def passing(
+    forecast: DisplacementForecast, category: Category, distance: FloatArray, progress: FloatArray
+) -> FloatArray:
+    """P(|x_j| ≥ distance_j given |x_j| ≥ progress_j) along the sign of Ω (n,).
+
+    Args:
+        forecast: of a primitive.
+        category: its Ω.
+        distance: (n,) [unit], not below the progress.
+        progress: (n,) [unit], at least 0.
+    """
+    mean = np.array(category) * forecast.mean
+    here = stdtr(forecast.dof, (mean - progress) / forecast.scale)
+    there = stdtr(forecast.dof, (mean - distance) / forecast.scale)
+    chance: FloatArray = np.clip(there / np.maximum(here, np.finfo(np.float64).tiny), 0.0, 1.0)
+    return chance
+
+
+@dataclass(frozen=True, slots=True)
+class Coverage:
+    """Share of displacements inside the central interval of ``level``.
+
+    Attributes:
+        level: probability that the interval promises.
+        actuators: share for each actuator (n,), nan where it never moved.
+        counts: primitives that moved it (n,).
+        overall: share of all of them, nan without any.
+    """
+
+    level: float
+    actuators: FloatArray
+    counts: npt.NDArray[np.int64]
+    overall: float
+
+
+def coverage(told: Sequence[Foretold], n: int, level: float) -> Coverage:
+    """Coverage of the central intervals of ``level`` over all n actuators."""
+    inside, asked = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
+    for one in told:
+        if one.forecast is None:
+            continue
+        low, high = (quantile(one.forecast, p) for p in (0.5 - level / 2, 0.5 + level / 2))
+        moved = np.array(one.segment.start.category) != 0
+        x = one.segment.displacement
+        asked += moved
+        inside += moved & (low <= x) & (x <= high)
+    total = int(asked.sum())
+    share = np.divide(inside, asked, out=np.full(n, np.nan), where=asked > 0)
+    return Coverage(level, share, asked, int(inside.sum()) / total if total else np.nan)
+
+
+@dataclass(frozen=True, slots=True)
+class Odds:
+    """Answers to "will actuator j pass d?": what was said and what came.
+
+    Attributes:
+        actuator: j (m,).
+        said: probability (m,).
+        passed: whether it did (m,).
+    """
+
+    actuator: npt.NDArray[np.int64]
+    said: FloatArray
+    passed: npt.NDArray[np.bool_]
+
+    def of(self, actuator: int) -> Odds:
+        """Those about one actuator."""
+        chosen = self.actuator == actuator
+        return Odds(self.actuator[chosen], self.said[chosen], self.passed[chosen])
+
+
+def odds(told: Sequence[Foretold], width: FloatArray) -> Odds:
+    """Ask every forecast at every sample about every distance ahead.
+
+    Args:
+        told: primitives with their forecasts.
+        width: range of each actuator (n,) [unit].
+    """
+    rows: list[tuple[int, float, bool]] = []
+    for one in told:
+        if one.forecast is None:
+            continue
+        category = one.segment.start.category
+        sign = np.array(category, dtype=np.float64)
+        moved = np.flatnonzero(sign)
+        reached = sign * one.segment.displacement
+        for q in _spaced(one.segment):
+            progress = np.maximum(sign * (q - one.segment.start.q), 0.0)
+            for ahead in AHEAD:
+                distance = progress + ahead * width
+                said = passing(one.forecast, category, distance, progress)
+                rows += [(int(j), float(said[j]), bool(reached[j] >= distance[j])) for j in moved]
+    return Odds(
+        actuator=np.array([j for j, _, _ in rows], dtype=np.int64),
+        said=np.array([p for _, p, _ in rows], dtype=np.float64),
+        passed=np.array([b for _, _, b in rows], dtype=bool),
+    )
+
+
+def _spaced(segment: Segment) -> list[FloatArray]:
+    """Positions of a primitive at least `SPACING_S` apart, while it was under way."""
+    chosen, last_s = [], -np.inf
+    for t, q in zip(segment.times_s.tolist(), segment.path, strict=True):
+        if t <= segment.end_s and t - last_s >= SPACING_S - _SLACK_S:
+            chosen.append(q)
+            last_s = t
+    return chosen
+
+
+@dataclass(frozen=True, slots=True)
+class Reliability:
+    """Probabilities in `BINS` equal bins, against what happened.
+
+    Attributes:
+        counts: answers in each bin (BINS,).
+        said: mean probability of each (BINS,), nan where empty.
+        happened: share that passed (BINS,), nan where empty.
+        error: expected calibration error: |said - happened| weighted by count, nan without any.
+    """
+
+    counts: npt.NDArray[np.int64]
+    said: FloatArray
+    happened: FloatArray
+    error: float
+
+
+def reliability(odds: Odds) -> Reliability:
+    """Bin the answers."""
+    bins = np.minimum((odds.said * BINS).astype(np.int64), BINS - 1)
+    counts = np.bincount(bins, minlength=BINS)
+    some = counts > 0
+    empty = np.full(BINS, np.nan)
+    said = np.bincount(bins, odds.said, BINS)
+    happened = np.bincount(bins, odds.passed, BINS)
+    gap = float(np.abs(said - happened).sum())
+    return Reliability(
+        counts,
+        np.divide(said, counts, out=empty.copy(), where=some),
+        np.divide(happened, counts, out=empty.copy(), where=some),
+        gap / len(bins) if len(bins) else np.nan,
+    )

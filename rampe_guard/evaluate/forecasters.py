@@ -1,0 +1,135 @@
+"""Forecasts of the next displacement: RAMPE, and the plain rules it has to beat.
+
+Each forecaster is asked at the start of a primitive and told its end, and knows nothing else.
+A forecaster that gives None counts as having said "no motion".
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from rampe_guard.core.config import GuardConfig
+from rampe_guard.core.intention import Intention
+from rampe_guard.core.rampe import DisplacementForecast, Rampe
+from rampe_guard.core.types import Category, FloatArray
+from rampe_guard.evaluate.segments import Segment, Start
+
+
+class Forecaster(Protocol):
+    """Predicts first, then learns."""
+
+    def predict(self, start: Start) -> FloatArray | None:
+        """Displacement x̂ (n,) [unit] of the primitive that starts, None for no forecast."""
+        ...
+
+    def observe(self, segment: Segment) -> None:
+        """Learn a primitive that has ended."""
+        ...
+
+
+class Zero:
+    """The arm stays where it is."""
+
+    def predict(self, start: Start) -> FloatArray:
+        """Zeros (n,)."""
+        return np.zeros_like(start.q)
+
+    def observe(self, segment: Segment) -> None:
+        """Nothing to learn."""
+
+
+class LastValue:
+    """What the category did the last time."""
+
+    def __init__(self) -> None:
+        self._last: dict[Category, FloatArray] = {}
+
+    def predict(self, start: Start) -> FloatArray | None:
+        """The last displacement of the category (n,) [unit]."""
+        return self._last.get(start.category)
+
+    def observe(self, segment: Segment) -> None:
+        """Keep it."""
+        self._last[segment.start.category] = segment.displacement
+
+
+class RunningMean:
+    """The mean of what the category did."""
+
+    def __init__(self) -> None:
+        self._mean: dict[Category, tuple[int, FloatArray]] = {}
+
+    def predict(self, start: Start) -> FloatArray | None:
+        """Mean displacement of the category (n,) [unit]."""
+        known = self._mean.get(start.category)
+        return None if known is None else known[1]
+
+    def observe(self, segment: Segment) -> None:
+        """Move the mean."""
+        x = segment.displacement
+        count, mean = self._mean.get(segment.start.category, (0, np.zeros_like(x)))
+        self._mean[segment.start.category] = (count + 1, mean + (x - mean) / (count + 1))
+
+
+class ConstantVelocity:
+    """The velocity at detection, held for the mean duration of all primitives so far."""
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._total_s = 0.0
+
+    def predict(self, start: Start) -> FloatArray | None:
+        """Velocity times mean duration (n,) [unit]."""
+        return start.velocity * (self._total_s / self._count) if self._count else None
+
+    def observe(self, segment: Segment) -> None:
+        """Count its duration."""
+        self._count += 1
+        self._total_s += segment.duration_s
+
+
+class FaithfulRampe:
+    """RAMPE to the letter of the paper: no prior, no estimate before three occurrences.
+
+    Args:
+        actuators: n.
+    """
+
+    def __init__(self, actuators: int) -> None:
+        self._model = Rampe(actuators, mode="faithful", n_init=3, tol=1e-6)
+
+    def predict(self, start: Start) -> FloatArray | None:
+        """Equation (2)."""
+        known = self._model.predict(start.category, start.q)
+        return None if known is None else known.mean
+
+    def observe(self, segment: Segment) -> None:
+        """Equations (3) and (4)."""
+        self._model.observe(segment.start.category, segment.start.q, segment.displacement)
+
+
+class SiteRampe:
+    """RAMPE as the guard of a site builds and runs it.
+
+    Args:
+        config: the guard's settings.
+        limits: actuator limits (n, 2) [unit].
+    """
+
+    def __init__(self, config: GuardConfig, limits: FloatArray) -> None:
+        self._model = Intention(config, limits).rampe
+
+    def forecast(self, start: Start) -> DisplacementForecast | None:
+        """The whole predictive distribution."""
+        return self._model.predict(start.category, start.q)
+
+    def predict(self, start: Start) -> FloatArray | None:
+        """Its location (n,) [unit]."""
+        known = self.forecast(start)
+        return None if known is None else known.mean
+
+    def observe(self, segment: Segment) -> None:
+        """Learn."""
+        self._model.observe(segment.start.category, segment.start.q, segment.displacement)
