@@ -94,6 +94,16 @@ def _replay(args: argparse.Namespace) -> int:
     return 0
 
 
+def _evaluate(args: argparse.Namespace) -> int:
+    from pathlib import Path
+
+    from rich.console import Console
+
+    from rampe_guard.programs.evaluating import evaluate
+
+    return evaluate(args.site, args.log, Path(args.out), Console(), fresh=args.fresh)
+
+
 def _schema(args: argparse.Namespace) -> int:
     from rampe_guard.settings import scene_schema, site_schema
     from rampe_guard.wire import json_schemas
@@ -150,6 +160,13 @@ def _parser() -> argparse.ArgumentParser:
     replay.add_argument("--speed", type=_positive, default=1.0, help="with --live (default 1)")
     replay.add_argument("--repeats", action="store_true", help="also print repeats of alerts")
     replay.set_defaults(command=_replay)
+
+    evaluate = commands.add_parser("evaluate", help="how good forecasts are on recorded work")
+    _site(evaluate)
+    evaluate.add_argument("log", nargs="+", help="CSV files of one operator, in order of time")
+    evaluate.add_argument("--out", default="evaluation", help="folder (default evaluation/)")
+    evaluate.add_argument("--fresh", action="store_true", help="learn each log from nothing")
+    evaluate.set_defaults(command=_evaluate)
 
     schema = commands.add_parser("schema", help="JSON Schemas of messages and files")
     schema.add_argument("name", nargs="?", help="one of them, such as rampe.alert.v1")

@@ -23,7 +23,7 @@ KNOWN = 5
 RESAMPLES = 1000
 _SEED = 20140501
 _QUANTILES = (0.025, 0.5, 0.975)
-CURVE_FROM = (0, 1, 2, 3, 5, 10, 20, 40, 80)
+CURVE_FROM = (0, 1, 2, 3, 5, 10, 20, 40)
 """First count of each bin of the learning curve; the last is open."""
 
 
@@ -88,6 +88,8 @@ def errors(trials: Trials, width: FloatArray, chosen: Mask) -> dict[str, Error]:
 def ratio(trials: Trials, width: FloatArray, chosen: Mask, over: str, under: str) -> Interval:
     """Error of ``over`` divided by that of ``under``, on the same resampled primitives.
 
+    nan where ``under`` is never wrong.
+
     Args:
         trials: N primitives.
         width: range of each actuator (n,) [unit].
@@ -97,7 +99,8 @@ def ratio(trials: Trials, width: FloatArray, chosen: Mask, over: str, under: str
     """
     pair = [trials.names.index(over), trials.names.index(under)]
     above, below = _resampled(_squares(trials, width)[pair][:, chosen].sum(axis=2))
-    return _interval(above / below)
+    nobody_errs = np.full_like(below, np.nan)  # the other was never wrong: no ratio
+    return _interval(np.divide(above, below, out=nobody_errs, where=below > 0.0))
 
 
 @dataclass(frozen=True, slots=True)

@@ -130,11 +130,24 @@ def cut(config: GuardConfig, limits: FloatArray, log: CsvLog) -> Run:
 
 
 def position_range(runs: Sequence[Run]) -> FloatArray:
-    """Greatest less smallest position of each actuator over all runs (n,) [unit]."""
-    low = np.min([run.low for run in runs], axis=0)
-    high = np.max([run.high for run in runs], axis=0)
-    width: FloatArray = high - low
-    return width
+    """Greatest less smallest position of each actuator over all runs (n,) [unit].
+
+    An actuator that never moved has no range; one unit serves as well, since it has no errors.
+    """
+    low, high = _extremes(runs)
+    return np.where(high > low, high - low, 1.0)
+
+
+def position_middle(runs: Sequence[Run]) -> FloatArray:
+    """Middle between the two (n,) [unit]."""
+    low, high = _extremes(runs)
+    return (low + high) / 2
+
+
+def _extremes(runs: Sequence[Run]) -> tuple[FloatArray, FloatArray]:
+    low: FloatArray = np.min([run.low for run in runs], axis=0)
+    high: FloatArray = np.max([run.high for run in runs], axis=0)
+    return low, high
 
 
 class _Follower:
