@@ -104,6 +104,14 @@ def _evaluate(args: argparse.Namespace) -> int:
     return evaluate(args.site, args.log, Path(args.out), Console(), fresh=args.fresh)
 
 
+def _paper(args: argparse.Namespace) -> int:
+    from rich.console import Console
+
+    from rampe_guard.programs.paper import paper
+
+    return paper(args.out, args.seeds, args.cycles, args.seed, Console())
+
+
 def _schema(args: argparse.Namespace) -> int:
     from rampe_guard.settings import scene_schema, site_schema
     from rampe_guard.wire import json_schemas
@@ -167,6 +175,13 @@ def _parser() -> argparse.ArgumentParser:
     evaluate.add_argument("--out", default="evaluation", help="folder (default evaluation/)")
     evaluate.add_argument("--fresh", action="store_true", help="learn each log from nothing")
     evaluate.set_defaults(command=_evaluate)
+
+    paper = commands.add_parser("paper", help="the paper's experiment: figures, table, page")
+    paper.add_argument("--out", default="paper", help="folder for the results (default paper)")
+    paper.add_argument("--seeds", type=_positive_int, default=20, help="runs (default 20)")
+    paper.add_argument("--cycles", type=_positive_int, default=23, help="of a run (default 23)")
+    paper.add_argument("--seed", type=_positive_int, default=1, help="of the first run (default 1)")
+    paper.set_defaults(command=_paper)
 
     schema = commands.add_parser("schema", help="JSON Schemas of messages and files")
     schema.add_argument("name", nargs="?", help="one of them, such as rampe.alert.v1")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
@@ -22,21 +21,12 @@ from rampe_guard.evaluate.paper_plot import (
     save,
     style,
 )
-from rampe_guard.evaluate.paper_report import Experiment, sign_name
+from rampe_guard.evaluate.paper_report import Experiment, FigureFile, sign_name
 
 _GREY = "#666666"
 _BEYOND = "#c00000"
 _EDGE = 1.1
 """Errors beyond this many times the largest displacement are drawn at the edge."""
-
-
-@dataclass(frozen=True, slots=True)
-class FigureFile:
-    """A figure that was written: its number, its name without ending, what it shows."""
-
-    name: str
-    title: str
-    caption: str
 
 
 def draw_figures(
@@ -123,7 +113,7 @@ def figure5(experiment: Experiment) -> Figure:
         label = f"{name}  ({q1:g}, {q2:.2f})"
         below = q2 < max(t[1] for t in targets.values())  # clear of the arrows
         axes.annotate(label, (q1, q2), (9, -15 if below else 8), textcoords="offset points")
-    axes.margins(x=0.4, y=0.15)
+    axes.margins(x=0.45, y=0.15)
     _plane(axes, experiment)
     return figure
 
@@ -161,7 +151,7 @@ def figure7(experiment: Experiment, run: Run, time_s: FloatArray, position: Floa
         members = p.of(category)
         for k in members:
             inside = (time_s >= p.start_s[k]) & (time_s <= p.end_s[k])
-            axes.plot(*position[inside].T, color=colour, linewidth=0.9, alpha=0.75, zorder=2)
+            axes.plot(*position[inside][::2].T, color=colour, linewidth=0.9, alpha=0.75, zorder=2)
         axes.plot(
             *p.start[members].T,
             mark,

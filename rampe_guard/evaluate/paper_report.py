@@ -78,6 +78,15 @@ class Report:
     claims: dict[PredictorName, tuple[Claim, ...]]
 
 
+@dataclass(frozen=True, slots=True)
+class FigureFile:
+    """A figure that was written: its name without ending, its heading, what it shows."""
+
+    name: str
+    title: str
+    caption: str
+
+
 def build_report(experiment: Experiment, runs: Sequence[Run]) -> Report:
     """Compute all tables and verdicts from the runs, of which there is at least one."""
     span = experiment.span
