@@ -11,8 +11,10 @@ from rampe_guard.settings.site import (
     ColumnMap,
     Keys,
     LogMapping,
+    MemorySettings,
     Site,
     ZenohSettings,
+    for_operator,
     load_site,
 )
 
@@ -20,8 +22,10 @@ __all__ = [
     "ColumnMap",
     "Keys",
     "LogMapping",
+    "MemorySettings",
     "Site",
     "ZenohSettings",
+    "for_operator",
     "load_scene",
     "load_site",
     "parse_scene",

@@ -5,9 +5,11 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
+
+from pydantic import TypeAdapter, ValidationError
 
 from rampe_guard.core.arm import ArmDescription, JointDrive
 from rampe_guard.core.config import (
@@ -26,13 +28,15 @@ from rampe_guard.core.scene import Scene
 from rampe_guard.errors import SettingsError
 from rampe_guard.settings.check import check
 from rampe_guard.settings.explain import validate
-from rampe_guard.settings.problems import Problems
+from rampe_guard.settings.model import MAX_NAME, Name
+from rampe_guard.settings.problems import Problems, show
 from rampe_guard.settings.scene import existing_file, load_scene, pose_matrix
 from rampe_guard.settings.site_model import (
     DEFAULT_ENDPOINT,
     ActuatorModel,
     ColumnModel,
     LogModel,
+    MemoryModel,
     SiteModel,
 )
 from rampe_guard.settings.source import parse, read_bytes
@@ -82,6 +86,21 @@ class LogMapping:
 
 
 @dataclass(frozen=True, slots=True)
+class MemorySettings:
+    """How what was learned outlives a restart.
+
+    Attributes:
+        enabled: whether it does.
+        directory: absolute path of the folder of all models, None for the system's usual one.
+        save_every_s: period of saving while something is learned [s].
+    """
+
+    enabled: bool = True
+    directory: str | None = None
+    save_every_s: float = 30.0
+
+
+@dataclass(frozen=True, slots=True)
 class Site:
     """A machine at a site.
 
@@ -99,6 +118,8 @@ class Site:
         path: absolute path of the site file.
         content_hash: SHA-256 (hex) of the site file followed by the URDF.
         package_dirs: where package:// meshes of the URDF are looked up.
+        operator: whose way of working is learned.
+        memory: how it is kept.
     """
 
     name: str
@@ -114,6 +135,8 @@ class Site:
     path: str
     content_hash: str
     package_dirs: tuple[str, ...] = ()
+    operator: str = "operator"
+    memory: MemorySettings = MemorySettings()
 
     @property
     def actuator_names(self) -> tuple[str, ...]:
@@ -151,6 +174,7 @@ def load_site(path: str | Path) -> Site:
             scene = load_scene(scene_file, actuators=names)
         except SettingsError as error:
             problems.extend(error)
+    memory = _memory(model.memory, directory, problems)
     problems.raise_if_any()
     digest = hashlib.sha256(content + read_bytes(urdf or "", "URDF file"))
     return Site(
@@ -167,7 +191,38 @@ def load_site(path: str | Path) -> Site:
         path=str(Path(path).absolute()),
         content_hash=digest.hexdigest(),
         package_dirs=tuple(os.path.normpath(directory / d) for d in arm.package_dirs),
+        operator=model.operator,
+        memory=memory,
     )
+
+
+def for_operator(site: Site, name: str | None) -> Site:
+    """The same site with another operator at the levers; unchanged if ``name`` is None.
+
+    Raises:
+        SettingsError: ``name`` is none.
+    """
+    if name is None:
+        return site
+    try:
+        TypeAdapter(Name).validate_python(name, strict=True)
+    except ValidationError:
+        raise SettingsError(
+            f"operator {show(name)} is no name; give 1 to {MAX_NAME} printable characters"
+            " without spaces at an end"
+        ) from None
+    return replace(site, operator=name)
+
+
+def _memory(model: MemoryModel, directory: Path, problems: Problems) -> MemorySettings:
+    folder = None
+    if model.directory is not None:
+        try:
+            folder = str((directory / Path(model.directory).expanduser()).absolute())
+        except RuntimeError:  # ~name of nobody
+            what = f"{show(model.directory)} begins with a home that does not exist"
+            problems.add(("memory", "directory"), what, "give the path of a folder")
+    return MemorySettings(model.enabled, folder, model.save_every_s)
 
 
 def _zenoh(model: SiteModel, config: str | None) -> ZenohSettings:

@@ -149,11 +149,32 @@ class LogModel(Model):
     )
 
 
+class MemoryModel(Model):
+    """Whether, where and how often the learned models are kept."""
+
+    enabled: bool = Field(
+        default=True, description="True if what is learned is kept over a restart."
+    )
+    directory: Text | None = Field(
+        default=None,
+        description="The folder of the kept models, relative to this file; if left out "
+        "$STATE_DIRECTORY, else $XDG_STATE_HOME/rampe-guard, else ~/.local/state/rampe-guard.",
+    )
+    save_every_s: Annotated[float, Field(ge=0.1, le=3600.0)] = Field(
+        default=30.0, description="The period of saving while something is learned [s]."
+    )
+
+
 class SiteModel(Model):
     """A machine at a site: its arm, its keys, its scene and how it is guarded."""
 
     site: Name = Field(description="The name of the site.")
     machine: Name = Field(description="The name of the machine.")
+    operator: Name = Field(
+        default="operator",
+        description="The name of the operator whose way of working is learned; "
+        "run --operator overrides it.",
+    )
     zenoh: ZenohModel = Field(default=ZenohModel(), description="The Zenoh session.")
     keys: KeysModel = Field(description="The Zenoh keys.")
     format: Literal["json", "ros2"] = Field(
@@ -167,6 +188,9 @@ class SiteModel(Model):
     stopping: StoppingModel = Field(default=StoppingModel(), description="The stopping forecast.")
     sweep: SweepModel = Field(default=SweepModel(), description="The certified sweep.")
     alerts: AlertsModel = Field(default=AlertsModel(), description="The alarm logic.")
+    memory: MemoryModel = Field(
+        default=MemoryModel(), description="The memory of what was learned."
+    )
     log: LogModel | None = Field(
         default=None, description="The columns of this machine's CSV logs."
     )

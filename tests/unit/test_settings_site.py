@@ -23,7 +23,7 @@ from rampe_guard.core.config import (
 from rampe_guard.core.drive import CylinderDrive, DirectDrive, FourBarDrive, TableDrive
 from rampe_guard.core.scene import ActuatorLimit
 from rampe_guard.errors import SettingsError
-from rampe_guard.settings import ColumnMap, Site, load_site
+from rampe_guard.settings import ColumnMap, MemorySettings, Site, for_operator, load_site
 from rampe_guard.settings import tuning_model as models
 
 SITE = """\
@@ -89,6 +89,7 @@ def test_only_five_keys_are_required_and_the_rest_defaults(load: Load, tmp_path:
     assert site.arm.urdf == str(tmp_path / "arm.urdf")
     assert site.path == str(tmp_path / "site.yaml")
     assert site.actuator_names == ("swing", "boom")
+    assert (site.operator, site.memory) == ("operator", MemorySettings())
 
 
 def test_hash_covers_site_file_and_urdf(load: Load) -> None:
@@ -120,6 +121,8 @@ inputs:
   speed_slack: 2
 joystick: {filter_s: 0.1, release_ratio: 0.5, debounce_s: 0}
 rampe: {n_init: 4, forgetting: 0.99, prior: {spread: 0.2}, observations: [q]}
+operator: Anna Müller
+memory: {enabled: false, directory: ../models, save_every_s: 5}
 stopping: {reaction_s: 0.5}
 sweep: {tolerance_m: 1e-3, max_queries: 100}
 alerts: {warning_probability: 0.6, debounce_steps: 3}
@@ -152,6 +155,9 @@ scene: scene.yaml""",
     assert site.log.time == ColumnMap("ms", 0.001)
     assert site.log.actuators["boom"] == ColumnMap("cm", 0.01, -1)
     assert site.log.joystick["swing"] == ColumnMap("a")
+    assert site.operator == "Anna Müller"
+    models_dir = str(tmp_path / ".." / "models")
+    assert site.memory == MemorySettings(enabled=False, directory=models_dir, save_every_s=5)
 
 
 @pytest.mark.parametrize(
@@ -248,6 +254,11 @@ def test_mistake_is_named_with_line_key_value_and_remedy(
         ("format: xml", "format: 'xml' is not 'json' or 'ros2'"),
         ("rampe: {n_init: 2.5}", "rampe.n_init: 2.5 is not a whole number"),
         ("rampe: {observations: []}", "rampe.observations: a list of 0 is too short: at least 1"),
+        ('operator: "a "', "operator: 'a ' has control characters or spaces at an end"),
+        ("memory: {save_every_s: 0}", "memory.save_every_s: 0 is less than 0.1; give the period"),
+        ("memory: {enabled: 1}", "memory.enabled: 1 is not true or false"),
+        ("memory: {direktory: a}", "memory.direktory: is not a known key; did you mean 'dir"),
+        ("memory: {directory: ~nobody-here/a}", "begins with a home that does not exist"),
         ("stopping:", "stopping: nothing is not a mapping"),
         ("alerts: {caution_probability: 0.9}", "0.9 is greater than warning_probability"),
         ("log: {time: t, joystick: {}, actuators: {}}", "has no column for swing, boom"),
@@ -346,3 +357,20 @@ def test_missing_file_directory_and_odd_paths(tmp_path: Path) -> None:
     ):
         with pytest.raises(SettingsError, match=expected):
             load_site(path)
+
+
+def test_the_folder_of_models_may_be_absolute_or_in_a_home(
+    load: Load, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOME", "/home/anna")
+    for given, expected in (("/var/models", "/var/models"), ("~/models", "/home/anna/models")):
+        assert load(SITE + f"memory: {{directory: {given}}}\n").memory.directory == expected
+
+
+def test_another_operator_for_one_run(load: Load) -> None:
+    site = load(SITE)
+    assert for_operator(site, None) is site
+    assert for_operator(site, "Ben").operator == "Ben"
+    for bad in ("", "a ", "a\nb", "x" * 65, "\udcff"):
+        with pytest.raises(SettingsError, match="is no name; give 1 to 64"):
+            for_operator(site, bad)
