@@ -1,4 +1,8 @@
-"""Do the starts of a category lie in two clusters, and does one linear model tell them apart?"""
+"""Two clusters in a category: of starts, which one linear model may tell apart; or of ends only.
+
+The second is the limit that the paper itself names (Fig. 2): paths that are tangent where they
+meet begin at one place in one category, and nothing in (q, Ω) says which of them is meant.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +16,9 @@ from rampe_guard.evaluate.paper_estimates import PredictorName, Run
 
 SEPARATION = 4.0
 """Centres this many RMS distances apart make two clusters: an even spread cut in two has 3.46."""
+
+ONE_PLACE = 2.0
+"""Starts less than this many RMS distances apart are one place."""
 
 LEAST_MEMBERS = 5
 _ROUNDS = 50
@@ -59,6 +66,22 @@ def two_clusters(run: Run, category: Category, span: FloatArray) -> TwoClusters 
     if _separation(q / span, second) < SEPARATION or _separation(x / span, second) < 1.0:
         return None
     return TwoClusters(category, members, second, _centres(q, second), _centres(x, second))
+
+
+def two_ways(run: Run, category: Category, span: FloatArray) -> bool:
+    """Does the category go two clearly different ways from one place?
+
+    Its displacements lie in two clusters, as in `two_clusters`, whose starts do not.
+    """
+    members = run.primitives.of(category)
+    if len(members) < 2 * LEAST_MEMBERS:
+        return False
+    q = run.primitives.start[members] / span
+    x = run.primitives.displacement[members] / span
+    second = _two_means(x)
+    if min(second.sum(), (~second).sum()) < LEAST_MEMBERS:
+        return False
+    return _separation(x, second) >= SEPARATION and _separation(q, second) < ONE_PLACE
 
 
 def told_apart(

@@ -23,7 +23,7 @@ body { font: 16px/1.5 system-ui, sans-serif; color: #1a1a1a; background: #fff;
   max-width: 66rem; margin: 2rem auto; padding: 0 1rem; }
 h1 { font-size: 1.6rem; line-height: 1.25; } h2 { font-size: 1.25rem; margin-top: 2.5rem; }
 h3 { font-size: 1rem; margin: 1.8rem 0 .4rem; }
-table { border-collapse: collapse; font-size: .875rem; }
+table { border-collapse: collapse; font-size: .875rem; margin: 0 0 1.2rem; }
 div.wide { overflow-x: auto; }
 th, td { padding: .3rem .7rem .3rem 0; text-align: right; vertical-align: top;
   border-bottom: 1px solid #e2e2e2; white-space: nowrap; }
@@ -46,6 +46,7 @@ def page(report: Report, figures: Sequence[tuple[FigureFile, bytes]]) -> str:
         "<h1>RAMPE: the engineering test of Section IV-B, reproduced</h1>",
         *_experiment(report),
         *_claims(report),
+        *_limits(report),
         *_quantiles(report),
         "<h2>Figures</h2>",
         f"<p>Drawn from the first run, seed {report.seeds[0]}.</p>",
@@ -114,6 +115,21 @@ def _claims(report: Report) -> Iterable[str]:
             limit = f"{'&gt;' if first.above else '≤'} {first.limit:g}"
             rows.append([escape(first.name), limit, *cells])
         yield _table(heads, rows, text_columns=1)
+
+
+def _limits(report: Report) -> Iterable[str]:
+    yield "<h3>Where the error is</h3>"
+    lines = [
+        f"<li>{mode}: {sign_name(category)} bears {part:.0%} of the squared error.</li>"
+        for mode in MODES
+        for category, part in list(report.squared[mode].items())[:1]
+    ]
+    lines += [
+        f"<li>In {count} of {len(report.seeds)} runs {sign_name(category)} goes two ways from one"
+        " place. Position and category cannot tell these apart (the tangent paths of Fig. 2).</li>"
+        for category, count in report.two_ways.items()
+    ]
+    yield "<ul>" + "".join(lines or ["<li>Nothing to show.</li>"]) + "</ul>"
 
 
 def _verdict(mode: str, claim: Claim) -> str:

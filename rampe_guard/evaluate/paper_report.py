@@ -5,12 +5,14 @@ from __future__ import annotations
 import csv
 import io
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from rampe_guard.core.types import Category, FloatArray
 from rampe_guard.evaluate.paper_claims import Claim, claims
+from rampe_guard.evaluate.paper_clusters import two_ways
 from rampe_guard.evaluate.paper_estimates import (
     MODES,
     N_INIT,
@@ -25,6 +27,7 @@ from rampe_guard.evaluate.paper_table import (
     ErrorQuantiles,
     category_rows,
     error_quantiles,
+    squared_shares,
 )
 
 
@@ -66,6 +69,8 @@ class Report:
         quantiles: per predictor, after initialising.
         quantiles_all: per predictor, over all occurrences.
         claims: per mode.
+        squared: share of the squared error that each category bears, per mode, largest first.
+        two_ways: runs in which a category goes two ways from one place, categories that do.
     """
 
     experiment: Experiment
@@ -76,6 +81,8 @@ class Report:
     quantiles: dict[PredictorName, ErrorQuantiles]
     quantiles_all: dict[PredictorName, ErrorQuantiles]
     claims: dict[PredictorName, tuple[Claim, ...]]
+    squared: dict[PredictorName, dict[Category, float]]
+    two_ways: dict[Category, int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +106,8 @@ def build_report(experiment: Experiment, runs: Sequence[Run]) -> Report:
         quantiles={p: error_quantiles(runs, p, span, initialised=True) for p in PREDICTORS},
         quantiles_all={p: error_quantiles(runs, p, span, initialised=False) for p in PREDICTORS},
         claims={mode: claims(runs, mode, span) for mode in MODES},
+        squared={mode: squared_shares(runs, mode, span) for mode in MODES},
+        two_ways=_two_ways(runs, span),
     )
 
 
@@ -130,6 +139,13 @@ def report_json(report: Report) -> dict[str, Any]:
             "after_initialising": {p: _quantiles_json(q) for p, q in report.quantiles.items()},
             "all_occurrences": {p: _quantiles_json(q) for p, q in report.quantiles_all.items()},
         },
+        "share_of_squared_error": {
+            mode: {sign_name(c): value for c, value in shares.items()}
+            for mode, shares in report.squared.items()
+        },
+        "runs_with_two_ways_from_one_place": {
+            sign_name(c): count for c, count in report.two_ways.items()
+        },
         "claims": {mode: [_claim_json(c) for c in found] for mode, found in report.claims.items()},
     }
 
@@ -155,6 +171,16 @@ def primitives_csv(runs: Sequence[Run], experiment: Experiment) -> str:
             row = [run.seed, *times, *category, int(p.occurrence[k])]
             table.writerow([*row, *(f"{value:.9g}" for value in numbers)])
     return text.getvalue()
+
+
+def _two_ways(runs: Sequence[Run], span: FloatArray) -> dict[Category, int]:
+    found = Counter(
+        category
+        for run in runs
+        for category in dict.fromkeys(run.primitives.category)
+        if two_ways(run, category, span)
+    )
+    return dict(found.most_common())
 
 
 def _row_json(row: CategoryRow, done: Experiment) -> dict[str, Any]:

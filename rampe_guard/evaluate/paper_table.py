@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -75,6 +75,21 @@ def share(run: Run, predictor: PredictorName, span: FloatArray, *, initialised: 
         scaled = scaled[run.initialised]
     size: FloatArray = np.linalg.norm(scaled, axis=1) / np.sqrt(scaled.shape[1])
     return size
+
+
+def squared_shares(
+    runs: Sequence[Run], predictor: PredictorName, span: FloatArray
+) -> dict[Category, float]:
+    """Which category bears how much of the squared error after initialising, largest first [-]."""
+    total: defaultdict[Category, float] = defaultdict(float)
+    for run in runs:
+        squares = np.sum((run.error(predictor) / span) ** 2, axis=1)
+        for category in dict.fromkeys(run.primitives.category):
+            members = run.primitives.of(category)
+            total[category] += float(squares[members[run.initialised[members]]].sum())
+    ordered = sorted(total.items(), key=lambda item: -item[1])
+    whole = sum(total.values())
+    return {c: value / whole for c, value in ordered} if whole > 0.0 else {}
 
 
 def rms(values: FloatArray) -> FloatArray | None:

@@ -103,7 +103,8 @@ def _write(folder: Path, report: Report, runs: Sequence[Run], shown: Recording) 
 def _summary(report: Report) -> RenderableType:
     done = report.experiment
     head = Text(
-        f"{len(report.seeds)} runs of {done.cycles} cycles, {report.primitives} primitives,"
+        f"{_count(len(report.seeds), 'run')} of {_count(done.cycles, 'cycle')},"
+        f" {report.primitives} primitives,"
         f" {done.minutes:.0f} simulated minutes",
         "bold",
     )
@@ -122,7 +123,7 @@ def _errors(report: Report) -> Table:
         table.add_column(title, header_style="dim", justify="right")
     for predictor in PREDICTORS:
         q = report.quantiles[predictor]
-        table.add_row(predictor, *(f"{value:.3f}" for value in (q.median, q.p90, q.p99)))
+        table.add_row(predictor, *(_share(value) for value in (q.median, q.p90, q.p99)))
     return table
 
 
@@ -131,6 +132,14 @@ def _claims(report: Report) -> Table:
     for found in zip(*(report.claims[mode] for mode in MODES), strict=True):
         table.add_row(found[0].text, *(claim.verdict.value for claim in found))
     return table
+
+
+def _share(value: float) -> str:
+    return f"{value:.3f}" if np.isfinite(value) else "-"
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def _table(*columns: str) -> Table:
