@@ -18,11 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import stdtr, stdtrit
 
-from rampe_guard.core.rampe import DisplacementForecast
 from rampe_guard.core.types import Category, FloatArray
 from rampe_guard.evaluate.forecasters import SiteRampe
+from rampe_guard.evaluate.predictive import Predictive
 from rampe_guard.evaluate.segments import Segment
 
 LEVELS = (0.5, 0.9)
@@ -43,7 +42,7 @@ class Foretold:
     """
 
     segment: Segment
-    forecast: DisplacementForecast | None
+    forecast: Predictive | None
     seen: int
 
 
@@ -58,34 +57,10 @@ def foretell(
             learner, seen = model(), Counter[Category]()
         for segment in segments:
             category = segment.start.category
-            found.append(Foretold(segment, learner.forecast(segment.start), seen[category]))
+            found.append(Foretold(segment, learner.distribution(segment.start), seen[category]))
             learner.observe(segment)
             seen[category] += 1
     return found
-
-
-def quantile(forecast: DisplacementForecast, p: float) -> FloatArray:
-    """p-quantile of the signed displacement (n,) [unit]."""
-    result: FloatArray = forecast.mean + forecast.scale * stdtrit(forecast.dof, p)
-    return result
-
-
-def passing(
-    forecast: DisplacementForecast, category: Category, distance: FloatArray, progress: FloatArray
-) -> FloatArray:
-    """P(|x_j| ≥ distance_j given |x_j| ≥ progress_j) along the sign of Ω (n,).
-
-    Args:
-        forecast: of a primitive.
-        category: its Ω.
-        distance: (n,) [unit], not below the progress.
-        progress: (n,) [unit], at least 0.
-    """
-    mean = np.array(category) * forecast.mean
-    here = stdtr(forecast.dof, (mean - progress) / forecast.scale)
-    there = stdtr(forecast.dof, (mean - distance) / forecast.scale)
-    chance: FloatArray = np.clip(there / np.maximum(here, np.finfo(np.float64).tiny), 0.0, 1.0)
-    return chance
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +86,7 @@ def coverage(told: Sequence[Foretold], n: int, level: float) -> Coverage:
     for one in told:
         if one.forecast is None:
             continue
-        low, high = (quantile(one.forecast, p) for p in (0.5 - level / 2, 0.5 + level / 2))
+        low, high = (one.forecast.quantile(p) for p in (0.5 - level / 2, 0.5 + level / 2))
         moved = np.array(one.segment.start.category) != 0
         x = one.segment.displacement
         asked += moved
@@ -152,15 +127,14 @@ def odds(told: Sequence[Foretold], width: FloatArray) -> Odds:
     for one in told:
         if one.forecast is None:
             continue
-        category = one.segment.start.category
-        sign = np.array(category, dtype=np.float64)
+        sign = np.array(one.segment.start.category, dtype=np.float64)
         moved = np.flatnonzero(sign)
         reached = sign * one.segment.displacement
         for q in _spaced(one.segment):
             progress = np.maximum(sign * (q - one.segment.start.q), 0.0)
             for ahead in AHEAD:
                 distance = progress + ahead * width
-                said = passing(one.forecast, category, distance, progress)
+                said = one.forecast.passing(distance, progress)
                 rows += [(int(j), float(said[j]), bool(reached[j] >= distance[j])) for j in moved]
     return Odds(
         actuator=np.array([j for j, _, _ in rows], dtype=np.int64),

@@ -12,8 +12,9 @@ import numpy as np
 
 from rampe_guard.core.config import GuardConfig
 from rampe_guard.core.intention import Intention
-from rampe_guard.core.rampe import DisplacementForecast, Rampe
+from rampe_guard.core.rampe import Rampe
 from rampe_guard.core.types import Category, FloatArray
+from rampe_guard.evaluate.predictive import Predictive, StudentPredictive
 from rampe_guard.evaluate.segments import Segment, Start
 
 
@@ -121,13 +122,14 @@ class SiteRampe:
     def __init__(self, config: GuardConfig, limits: FloatArray) -> None:
         self._model = Intention(config, limits).rampe
 
-    def forecast(self, start: Start) -> DisplacementForecast | None:
+    def distribution(self, start: Start) -> Predictive | None:
         """The whole predictive distribution."""
-        return self._model.predict(start.category, start.q)
+        known = self._model.predict(start.category, start.q)
+        return None if known is None else StudentPredictive(known, start.category)
 
     def predict(self, start: Start) -> FloatArray | None:
         """Its location (n,) [unit]."""
-        known = self.forecast(start)
+        known = self._model.predict(start.category, start.q)
         return None if known is None else known.mean
 
     def observe(self, segment: Segment) -> None:

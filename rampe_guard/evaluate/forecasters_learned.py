@@ -29,7 +29,7 @@ _WHITE, _WHITE_BOUNDS = 0.5, (1e-3, 2.0)
 _SIGNAL_BOUNDS = (1e-2, 10.0)
 _FEWEST = 5
 """Occurrences below which three hyper-parameters cannot be told from noise."""
-_GROWTH = 1.2
+_GROWTH = 1.5
 """Hyper-parameters are sought anew when a category has grown by this factor."""
 
 

@@ -49,11 +49,12 @@ from rampe_guard.evaluate.prequential import Trials, prequential
 from rampe_guard.evaluate.segments import Run, position_middle, position_range
 
 RAMPE = "RAMPE"
+ZERO = "zero"
 MEAN = "running mean"
 PROCESS = "Gaussian process"
 
 FORECASTERS = {
-    "zero": "no motion",
+    ZERO: "no motion",
     "last value": "what the category did the last time",
     "constant velocity": "velocity at detection times the mean duration of all primitives so far",
     MEAN: "mean of what the category did",

@@ -9,7 +9,7 @@ import numpy as np
 
 from rampe_guard.evaluate.calibration import Reliability
 from rampe_guard.evaluate.extra import missing
-from rampe_guard.evaluate.prediction import MEAN, PROCESS, RAMPE, Calibration, Prediction
+from rampe_guard.evaluate.prediction import MEAN, PROCESS, RAMPE, ZERO, Calibration, Prediction
 from rampe_guard.evaluate.prediction_score import KNOWN, CurvePoint
 
 try:
@@ -29,6 +29,8 @@ _CURVES = {
     "RAMPE, faithful": ("#e0a080", "D"),
     RAMPE: (_OURS, "o"),
 }
+_MOST = 1.5
+"""Errors above this many times that of predicting no motion run off the axes."""
 _FEW = 20
 """Bins with fewer answers are not drawn: their share is chance."""
 
@@ -66,12 +68,14 @@ def _bars(axes: Axes, prediction: Prediction) -> None:
     axes.barh(at - 0.08, values, 0.5, color=colours, xerr=whiskers, ecolor=_INK, capsize=3)
     everything = [prediction.total.everything[n].error for n in names]
     axes.barh(at + 0.27, everything, 0.16, color=_GREY)
-    room = 1.03 * max(float(high.max()), *everything)
+    room = 1.03 * min(max(float(high.max()), *everything), _MOST * known[ZERO].error)
+    room = room or 1.0  # nobody erred: nothing moved
     for y, value in zip(at.tolist(), values.tolist(), strict=True):
-        axes.text(room, y, f"{value:.3f}", va="center", fontsize=9, color=_INK)
+        text = f"{value:.3f}" if value < room else f"→ {value:.3f}"
+        axes.text(room * 1.01, y, text, va="center", fontsize=9, color=_INK)
     axes.set_yticks(at, names)
     axes.invert_yaxis()
-    axes.set_xlim(0.0, room * 1.12)
+    axes.set_xlim(0.0, room)
     counted = prediction.total.primitives_known
     which = f"{counted} primitives of categories seen at least {KNOWN} times before"
     if not prediction.total.known:
@@ -87,7 +91,7 @@ def _curve(axes: Axes, curve: Sequence[CurvePoint]) -> None:
         width = 2.4 if name == RAMPE else 1.4
         axes.plot(at, values, color=colour, marker=marker, markersize=5, lw=width, label=name)
     axes.set_xticks(at, [f"{_bin(p)}\n({p.primitives})" for p in curve], fontsize=8)
-    axes.set_ylim(bottom=0.0)
+    axes.set_ylim(0.0, _MOST * max(p.errors[ZERO] for p in curve) or 1.0)
     axes.set_title("Error against experience", loc="left", fontsize=10)
     axes.set_xlabel("occurrences of the category before (primitives)")
     axes.set_ylabel("error [share of the range]")
@@ -112,7 +116,7 @@ def _reliability(axes: Axes, found: Calibration, names: Sequence[str]) -> None:
     axes.yaxis.set_major_formatter(PercentFormatter(1.0))
     answers = int(found.overall.counts.sum())
     axes.set_title(
-        f"Will it pass d? Reliability inside a primitive, {RAMPE} ({answers} answers)",
+        f"Will it pass d? Reliability inside a primitive, {RAMPE}\n{answers} answers",
         loc="left",
         fontsize=10,
     )
@@ -149,7 +153,7 @@ def _coverage(axes: Axes, found: Calibration, names: Sequence[str]) -> None:
     axes.yaxis.set_major_formatter(PercentFormatter(1.0))
     promised = " and ".join(f"{c.level:.0%}" for c in found.coverage)
     axes.set_title(
-        f"Coverage of the central {promised} intervals, {RAMPE} (line: promised)",
+        f"Coverage of the central {promised} intervals, {RAMPE}\nline: promised",
         loc="left",
         fontsize=10,
     )

@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from rampe_guard.assembly import load_machine
-from rampe_guard.evaluate.prediction import MEAN, PROCESS, RAMPE, Prediction, assess
+from rampe_guard.evaluate.prediction import MEAN, PROCESS, RAMPE, ZERO, Prediction, assess
 from rampe_guard.evaluate.prediction_plot import draw
 from rampe_guard.evaluate.prediction_report import report
 from rampe_guard.evaluate.prediction_score import KNOWN, Error
@@ -108,7 +108,7 @@ def _three(error: Error | None) -> tuple[str, str, str]:
 
 
 def _runs(prediction: Prediction) -> Table:
-    shown = ("zero", MEAN, PROCESS, RAMPE)
+    shown = (ZERO, MEAN, PROCESS, RAMPE)
     titles = (
         "primitives",
         "cut\nshort",
