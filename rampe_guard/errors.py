@@ -7,6 +7,7 @@
     ├── GeometryError        a URDF, mesh or linkage that cannot be used: file and reason
     ├── MessageError         a message that breaks the contract: key and reason
     ├── LogError             a recording that cannot be replayed: file, line, column
+    ├── ModelFileError       kept models that cannot be read, written or found: file and reason
     ├── InterruptedReplayError  a replay was stopped before its end: no score
     └── ConnectionFailedError  no router answered, or the session was refused
 
@@ -43,6 +44,10 @@ class MessageError(RampeGuardError):
 
 class LogError(RampeGuardError):
     """A recording cannot be replayed; the message names file, line or column, and why."""
+
+
+class ModelFileError(RampeGuardError):
+    """A kept model cannot be read, written or found; the message names the file and why."""
 
 
 class InterruptedReplayError(RampeGuardError):
