@@ -94,4 +94,5 @@ def plain(figure: Figure, rows: int, columns: int) -> Sequence[Axes]:
 def save(figure: Figure, folder: Path, name: str) -> None:
     """Write ``name``.png and ``name``.svg into ``folder``."""
     figure.savefig(folder / f"{name}.png", dpi=_DPI, metadata={"Software": None})
+    figure.set_layout_engine("none")  # laid out by now; doing it again takes as long as drawing
     figure.savefig(folder / f"{name}.svg", metadata={"Date": None})

@@ -80,7 +80,7 @@ def test_faithful_says_nothing_three_times_and_then_knows_a_linear_world() -> No
     # not to the last digit: with degrees beside metres the tolerance cuts a direction
     error = np.abs(run.error("faithful")) / run.primitives.displacement
     assert error[:N_INIT].min() == 1.0
-    assert error[N_INIT:].max() < 0.02
+    assert error[N_INIT:].max() < 0.05
     assert run.initialised.tolist() == [False] * 3 + [True] * 9
 
 
