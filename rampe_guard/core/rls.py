@@ -34,93 +34,17 @@ The sums Σ λ^age h_iᵀ h_j do not contain R, so a new R applies to the past a
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import lapack
-from scipy.sparse.csgraph import connected_components
 
+from rampe_guard.core.noise import IndexArray, Weighting
 from rampe_guard.core.types import FloatArray
-
-IndexArray: TypeAlias = npt.NDArray[np.intp]
 
 _EPS = float(np.finfo(np.float64).eps)
 _ESTIMATE_SLACK = 10.0
 """How far LAPACK's estimate of 1/κ₁ may lie above the true one."""
-_SYMMETRY = 1e-9
-"""Largest difference of R_ij and R_ji [√(R_ii R_jj)] that counts as rounding."""
-
-
-@dataclass(frozen=True, slots=True)
-class Weighting:
-    """G = R⁻¹ of equation (5), taken apart: R = D C D.
-
-    Attributes:
-        covariance: R (n, n).
-        deviation: diagonal of D (n,) [unit].
-        inverse: C⁻¹ (n, n), C the correlation.
-        values: eigenvalues of C⁻¹ (n,).
-        vectors: its eigenvectors (n, n), one a column.
-        relative: each eigenvalue as a share of the largest of its component (n,).
-        components: actuators that R couples, directly or through others.
-    """
-
-    covariance: FloatArray
-    deviation: FloatArray
-    inverse: FloatArray
-    values: FloatArray
-    vectors: FloatArray
-    relative: FloatArray
-    components: tuple[IndexArray, ...]
-
-    def restricted(self, actuators: IndexArray) -> Weighting:
-        """The same for ``actuators`` only, a union of components."""
-        if len(actuators) == len(self.deviation):
-            return self
-        return weighting(self.covariance[np.ix_(actuators, actuators)])
-
-
-def weighting(covariance: FloatArray, *, coupled: bool = False) -> Weighting:
-    """Take R (n, n) apart.
-
-    Args:
-        covariance: R, symmetric and positive definite.
-        coupled: treat all actuators as one component, whatever R's pattern.
-
-    Raises:
-        ValueError: R is not square, finite, symmetric or positive definite.
-    """
-    r = np.asarray(covariance, dtype=np.float64)
-    if r.ndim != 2 or r.shape[0] != r.shape[1]:  # noqa: PLR2004 - a matrix
-        raise ValueError(f"R has shape {r.shape}, must be square")
-    n = len(r)
-    variance = r.diagonal()
-    if not (np.isfinite(r).all() and (variance > 0.0).all()):
-        raise ValueError(f"R must be finite with a positive diagonal, is {r.tolist()}")
-    deviation = np.sqrt(variance)
-    correlation = r / deviation[:, None] / deviation
-    if np.abs(correlation - correlation.T).max(initial=0.0) > _SYMMETRY:
-        raise ValueError(f"R must be symmetric, is {r.tolist()}")
-    correlation = (correlation + correlation.T) / 2
-    np.fill_diagonal(correlation, 1.0)
-    groups = (np.arange(n),) if coupled else _components(correlation)
-    values, relative, vectors = np.ones(n), np.ones(n), np.eye(n)
-    for group in groups:
-        if len(group) == 1:
-            continue
-        block = np.ix_(group, group)
-        c, vectors[block] = np.linalg.eigh(correlation[block])
-        if c[0] <= n * _EPS * c[-1]:
-            raise ValueError(f"R must be positive definite, is {r.tolist()}")
-        values[group], relative[group] = 1.0 / c, c[0] / c
-    inverse = (vectors * values) @ vectors.T
-    return Weighting(r, deviation, inverse, values, vectors, relative, groups)
-
-
-def _components(correlation: FloatArray) -> tuple[IndexArray, ...]:
-    count, label = connected_components(correlation != 0.0, directed=False)
-    return tuple(np.flatnonzero(label == i) for i in range(count))
 
 
 def cholesky_if_uncut(p: FloatArray, tol: float) -> FloatArray | None:
