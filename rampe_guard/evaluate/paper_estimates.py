@@ -1,7 +1,8 @@
 """What each predictor said of every primitive before it was made (prequential).
 
-First the estimate x̂[k] from the start q[k] and all earlier occurrences, then the true x[k]
-is shown. Where a predictor says nothing, x̂ = 0, as in the paper's test.
+First the estimate x̂[k] by equation (2), from the start q[k] and all earlier occurrences, then
+the true x[k] is shown for the update (3), (4). Where a predictor says nothing, x̂ = 0, as in
+the paper's test.
 """
 
 from __future__ import annotations

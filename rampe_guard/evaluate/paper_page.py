@@ -83,7 +83,7 @@ def _experiment(report: Report) -> Iterable[str]:
         f" {done.minutes:.0f} simulated minutes, {report.primitives} primitives,"
         f" {done.corrections} corrections. Every estimate is made from the start of a primitive"
         f" and the earlier primitives of its category, before the true displacement is shown."
-        f" E = x − x̂, regressor [q1, q2, 1].</p>"  # noqa: RUF001
+        f" E = x \N{MINUS SIGN} x̂, regressor [q1, q2, 1].</p>"
     )
     yield (
         "<ul>"
@@ -139,7 +139,7 @@ def _verdict(mode: str, claim: Claim) -> str:
 def _condition(condition: Condition) -> tuple[str, str]:
     shown = condition.shown
     if condition.share is None:
-        return "no run shows it", "–"  # noqa: RUF001
+        return "no run shows it", "\N{EN DASH}"
     mark = "met" if condition.met else "not met"
     values = f"{np.median(shown):.3g} ({shown.min():.3g} to {shown.max():.3g})"
     return values, f"{condition.share:.0%} of {shown.size}, {mark}"
@@ -197,11 +197,11 @@ def _category_table(rows: Sequence[CategoryRow], done: Experiment) -> str:
 
 
 def _of(values: FloatArray | None, i: int) -> str:
-    return "–" if values is None else _number(float(values[i]))  # noqa: RUF001
+    return "\N{EN DASH}" if values is None else _number(float(values[i]))
 
 
 def _number(value: float) -> str:
-    return f"{value:.3g}" if math.isfinite(value) else "–"  # noqa: RUF001
+    return f"{value:.3g}" if math.isfinite(value) else "\N{EN DASH}"
 
 
 def _seeds(seeds: Sequence[int]) -> str:

@@ -113,7 +113,7 @@ def build_report(experiment: Experiment, runs: Sequence[Run]) -> Report:
 
 def sign_name(category: Category) -> str:
     """Ω as a person writes it: (+, -, 0)."""
-    return "(" + ", ".join({1: "+", -1: "−", 0: "0"}[s] for s in category) + ")"  # noqa: RUF001
+    return "(" + ", ".join({1: "+", -1: "\N{MINUS SIGN}", 0: "0"}[s] for s in category) + ")"
 
 
 def report_json(report: Report) -> dict[str, Any]:

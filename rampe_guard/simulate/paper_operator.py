@@ -43,7 +43,7 @@ class CarefulOperator(Operator):
 
     Args:
         actuators: of the machine, in order.
-        waypoints: the work, in order.
+        waypoints: the work, in order, each with a name of its own.
         seed: of everything he does.
         habits: how he drives.
         care: when and how he corrects.
@@ -52,7 +52,8 @@ class CarefulOperator(Operator):
         corrections: moves that he made a second or third time.
 
     Raises:
-        ValueError: as `Operator`; or the tolerance is not one positive value per actuator.
+        ValueError: as `Operator`; or the tolerance is not one positive value per actuator; or
+            two waypoints have one name.
     """
 
     def __init__(
@@ -66,6 +67,9 @@ class CarefulOperator(Operator):
         super().__init__(actuators, waypoints, seed, habits)
         if care.tolerance.shape != (len(actuators),) or not np.all(care.tolerance > 0.0):
             raise ValueError(f"tolerance={care.tolerance} must be {len(actuators)} values above 0")
+        names = [w.name for w in waypoints]
+        if len({*names, CORRECTION}) <= len(names):
+            raise ValueError(f"waypoints {names} need names of their own, not {CORRECTION!r}")
         self._care = care
         # his second looks must not change what he plans
         self._second = np.random.default_rng([seed, 1])
@@ -89,8 +93,10 @@ class CarefulOperator(Operator):
     def _look(self, position: FloatArray) -> None:
         """Put a correction after the phase that has just ended, where one is needed."""
         phase = self._todo[0]
-        if phase.name != CORRECTION:
+        if phase.name in self._goal:
             self._meant, self._tries = self._goal[phase.name], 0
+        if phase.too_far:  # he is about to come back
+            return
         off = {
             i: target
             for i, target in self._meant.items()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -23,7 +24,7 @@ from rampe_guard.simulate.paper_arm import (
 )
 from rampe_guard.simulate.paper_operator import CORRECTION, Care, CarefulOperator
 from rampe_guard.simulate.run import simulate
-from rampe_guard.simulate.work import Habits
+from rampe_guard.simulate.work import Habits, Overshoot
 
 
 @pytest.fixture(scope="module")
@@ -118,3 +119,31 @@ def test_he_gives_up_after_his_tries() -> None:
 def test_a_tolerance_for_every_actuator(tolerance: list[float]) -> None:
     with pytest.raises(ValueError, match="tolerance"):
         CarefulOperator(ACTUATORS, paper_waypoints(), 1, Habits(), Care(np.array(tolerance)))
+
+
+def test_who_goes_too_far_comes_back_and_then_corrects_towards_the_target() -> None:
+    far = Overshoot("swing", -20.0, -15.0)
+    waypoints = [replace(w, overshoot=far) if w.name == "A to B" else w for w in paper_waypoints()]
+    care = Care(np.array([1.0, 0.005]), foresight=(0.9, 1.1))
+    operator = CarefulOperator(ACTUATORS, waypoints, 3, Habits(overshoot_probability=1.0), care)
+    phases, swing = [""], []
+    machine, start = build_machine(ACTUATORS, LIMITS), np.array(TARGETS["A"])
+    for tick in simulate(ACTUATORS, operator, machine, start, cycles=2):
+        if operator.phase != phases[-1]:
+            phases.append(operator.phase)
+            swing.append(tick.position[0])
+    at = phases.index("A to B")
+    assert phases[at + 1] == "come back"  # nothing in between
+    assert operator.overshoots >= 2
+    assert swing[at] < TARGETS["B"][0] - 10.0
+    after = swing[phases.index("B to C") - 1]
+    assert after == pytest.approx(TARGETS["B"][0], abs=2.0)
+
+
+def test_waypoints_need_names_of_their_own() -> None:
+    twice = [*paper_waypoints(), paper_waypoints()[0]]
+    with pytest.raises(ValueError, match="names of their own"):
+        CarefulOperator(ACTUATORS, twice, 1, Habits(), Care(np.array([1.0, 0.01])))
+    clash = [replace(paper_waypoints()[0], name=CORRECTION)]
+    with pytest.raises(ValueError, match="names of their own"):
+        CarefulOperator(ACTUATORS, clash, 1, Habits(), Care(np.array([1.0, 0.01])))
