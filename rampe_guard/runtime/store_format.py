@@ -39,8 +39,8 @@ _HEADER = "header"
 _SUFFIX = ".npy"
 _NUMERIC = "biuf"
 """Kinds of numpy's dtypes: bool, int, unsigned, float."""
-_FREE = ("n_init", "forgetting", "tol", "prior")
-"""Settings that decide how one goes on from a model, not what its numbers mean."""
+_SAME = ("basis", "observations")
+"""Settings that decide what the numbers mean; others, how one goes on from them."""
 _SAME_LIMIT = 1e-6
 """Limits may differ by this share of the range: rounding in the URDF and in the drive."""
 _BROKEN = (
@@ -137,9 +137,8 @@ def misfit(found: Header, needed: Header) -> str | None:
                 f"the limits of {old.name} were {_span(old)} when it was learned and are"
                 f" {_span(new)} now"
             )
-    old_settings, new_settings = (_meaning(header.settings) for header in (found, needed))
-    for name in sorted(old_settings.keys() | new_settings.keys()):
-        was, now = old_settings.get(name), new_settings.get(name)
+    for name in _SAME:
+        was, now = found.settings.get(name), needed.settings.get(name)
         if was != now:
             return f"it was learned with rampe.{name} {was!r}; the site file has {now!r}"
     return None
@@ -278,7 +277,3 @@ def _span(actuator: ActuatorTag) -> str:
         return "none"
     low, high = ("…" if v is None else f"{v:.6g}" for v in (actuator.lower, actuator.upper))
     return f"{low} to {high} {actuator.unit}"
-
-
-def _meaning(settings: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in settings.items() if name not in _FREE}

@@ -1,0 +1,75 @@
+"""The thread that brings models to the disk, so that the worker loop never waits for it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy.typing as npt
+
+from rampe_guard.core.types import Category
+from rampe_guard.errors import ModelFileError
+from rampe_guard.runtime.store import ModelFile
+from rampe_guard.runtime.store_format import Header, encode
+
+
+@dataclass(frozen=True, slots=True)
+class Save:
+    """One state of the models: header, arrays, and occurrences by category to tell it by."""
+
+    header: Header
+    arrays: Mapping[str, npt.NDArray[Any]]
+    counts: Mapping[Category, int]
+
+
+class Saver:
+    """Writes the newest `Save` that it was given; two never at once, older ones never after.
+
+    Attributes:
+        saved: occurrences by category in the file as it is now.
+        problem: why the last save failed; None if it did not.
+    """
+
+    def __init__(self, file: ModelFile, saved: Mapping[Category, int]) -> None:
+        self.saved = saved
+        self.problem: str | None = None
+        self._file = file
+        self._next: Save | None = None
+        self._over = False
+        self._changed = threading.Condition()
+        # a daemon: a disk that hangs must not keep the process from ending
+        self._thread = threading.Thread(target=self._work, name="model-saver", daemon=True)
+        self._thread.start()
+
+    def give(self, save: Save) -> None:
+        """Have it written as soon as the disk is free, instead of one that still waits."""
+        with self._changed:
+            self._next = save
+            self._changed.notify()
+
+    def finish(self, within_s: float) -> bool:
+        """Write what still waits and end; False if the disk did not follow in time."""
+        with self._changed:
+            self._over = True
+            self._changed.notify()
+        self._thread.join(within_s)
+        return not self._thread.is_alive()
+
+    def _work(self) -> None:
+        while (save := self._wait()) is not None:
+            try:
+                self._file.write(encode(save.header, save.arrays))
+            except (ModelFileError, ValueError, MemoryError) as error:
+                self.problem = str(error) or type(error).__name__
+            else:
+                self.saved = save.counts
+                self.problem = None
+
+    def _wait(self) -> Save | None:
+        with self._changed:
+            while self._next is None and not self._over:
+                self._changed.wait()
+            save, self._next = self._next, None
+            return save
