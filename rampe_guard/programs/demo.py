@@ -11,6 +11,7 @@ import os
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -52,7 +53,9 @@ def demo(cycles: int, seed: int, console: Console, stop: StopFlag) -> int:
     site_path = str(shipped_site("demo"))
     site = connect_to(load_site(site_path), [endpoint])
     with contextlib.ExitStack() as stack:
-        start = stack.enter_context(_children())
+        # what a simulated operator taught is nobody's way of working: it goes with the demo
+        state = stack.enter_context(tempfile.TemporaryDirectory(prefix="rampe-guard-demo-"))
+        start = stack.enter_context(_children(state))
         router = start("router", ["-m", "rampe_guard.runtime.router", endpoint])
         guard = start("guard", ["-m", "rampe_guard", "run", site_path, "--connect", endpoint])
         # the operator waits for a listener before he begins to work
@@ -108,9 +111,9 @@ class _Score:
 
 
 @contextlib.contextmanager
-def _children() -> Iterator[_Starter]:
-    """Start processes; all of them are ended, by pid, when the context is left."""
-    starter = _Starter()
+def _children(state: str) -> Iterator[_Starter]:
+    """Start processes, which keep models below ``state``; all are ended, by pid, on leaving."""
+    starter = _Starter(state)
     try:
         yield starter
     finally:
@@ -137,18 +140,19 @@ def _gone_home(operator: subprocess.Popen[bytes]) -> bool:
 
 
 class _Starter:
-    def __init__(self) -> None:
+    def __init__(self, state: str) -> None:
+        self._state = state
         self.processes: list[subprocess.Popen[bytes]] = []
 
     def __call__(self, name: str, arguments: Sequence[str]) -> subprocess.Popen[bytes]:
         # one thread each: the maths is small, and the cores are shared
-        environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+        ours = {"OPENBLAS_NUM_THREADS": "1", "STATE_DIRECTORY": self._state}
         process = subprocess.Popen(  # noqa: S603 - our own modules
             [sys.executable, *arguments],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE if name == "operator" else subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
-            env=environment,
+            env={**os.environ, **ours},
             start_new_session=True,  # Ctrl-C is for this process, which then ends the others
         )
         self.processes.append(process)

@@ -14,6 +14,7 @@ import os
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -40,6 +41,8 @@ class Ear:
             endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
         self.log, self._speed, self._stack = log, speed, stack
         self._site = connect_to(site, [endpoint])
+        # nothing is learned beforehand, nor kept of what private recordings teach
+        self._state = stack.enter_context(tempfile.TemporaryDirectory())
         self._run("rampe_guard.runtime.router", endpoint)
         machine = load_machine(site)
         self.tally = Tally(machine.sweeper, machine.sweeper.zones)
@@ -90,7 +93,7 @@ class Ear:
             [sys.executable, "-m", *arguments],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
-            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "STATE_DIRECTORY": self._state},
         )
         self._stack.callback(process.wait)
         self._stack.callback(process.terminate)

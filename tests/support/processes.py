@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
+import functools
 import os
+import shutil
 import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -42,8 +46,17 @@ def until(found: Callable[[], T | None], within_s: float, what: Callable[[], str
         time.sleep(0.01)
 
 
+def environment(state: Path) -> dict[str, str]:
+    """Of every process: one thread for the maths, and models kept below ``state``.
+
+    So no test learns from another, nor from what is kept on this machine.
+    """
+    ours = {"OPENBLAS_NUM_THREADS": "1", "COLUMNS": "100", "STATE_DIRECTORY": str(state)}
+    return {**os.environ, **ours}
+
+
 class Process:
-    """``python ARGS`` with stdout and stderr in files below ``folder``."""
+    """``python ARGS`` with stdout, stderr and kept models in files below ``folder``."""
 
     def __init__(self, folder: Path, name: str, args: Sequence[str | Path]) -> None:
         self._out_path = folder / f"{name}-{time.monotonic_ns()}.out"
@@ -55,7 +68,7 @@ class Process:
                 stdin=subprocess.DEVNULL,
                 stdout=out,
                 stderr=err,
-                env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "COLUMNS": "100"},
+                env=environment(folder / "state"),
             )
 
     @property
@@ -134,8 +147,18 @@ def guard(folder: Path, site: Path, endpoint: str) -> Process:
     return process
 
 
-def command(*args: str | Path, stdin: str = "") -> subprocess.CompletedProcess[str]:
-    """Run ``rampe-guard ARGS`` to its end."""
+@functools.cache
+def _nowhere() -> Path:
+    """A folder for commands that keep nothing."""
+    folder = Path(tempfile.mkdtemp(prefix="rampe-guard-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
+def command(
+    *args: str | Path, stdin: str = "", state: Path | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Run ``rampe-guard ARGS`` to its end; models are kept below ``state``."""
     return subprocess.run(
         [sys.executable, "-m", "rampe_guard", *map(str, args)],
         cwd=ROOT,
@@ -144,7 +167,7 @@ def command(*args: str | Path, stdin: str = "") -> subprocess.CompletedProcess[s
         encoding="utf-8",
         timeout=120,
         check=False,
-        env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "COLUMNS": "100"},
+        env=environment(state or _nowhere()),
     )
 
 
