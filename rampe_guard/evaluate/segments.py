@@ -58,6 +58,8 @@ class Segment:
         displacement: x (n,) [unit].
         times_s: of the positions seen from its detection to that of its end (k,) [s].
         path: these positions (k, n) [unit].
+        velocities: measured at them (k, n) [unit/s].
+        commands: filtered lever at them (k, n) [-].
         complete: False when inputs were missing or refused meanwhile.
     """
 
@@ -67,6 +69,8 @@ class Segment:
     displacement: FloatArray
     times_s: FloatArray
     path: FloatArray
+    velocities: FloatArray
+    commands: FloatArray
     complete: bool
 
     @property
@@ -166,7 +170,7 @@ class _Follower:
         self._velocity = VelocityEstimator(np.array([a.max_velocity for a in config.actuators]))
         self._shortest_s = config.joystick.debounce_s
         self._start: Start | None = None
-        self._path: list[ActuatorSample] = []
+        self._way: list[tuple[float, FloatArray, FloatArray, FloatArray]] = []
         self._step_s: float | None = None
         self.refused = 0
         self.low: FloatArray = np.full(len(config.actuators), np.inf)
@@ -196,7 +200,8 @@ class _Follower:
             self._tracker.position(moved.stamp_s, moved.position)
             change = self._detector.advance(moved.stamp_s)
             yield from self._changed(change, moved.stamp_s, learn=learn)
-            self._path.append(moved)
+            seen = moved.position, self._velocity.velocity, self._detector.command
+            self._way.append((moved.stamp_s, *seen))
             self.low = np.minimum(self.low, moved.position)
             self.high = np.maximum(self.high, moved.position)
         self._look(now_s)
@@ -227,7 +232,7 @@ class _Follower:
         if finished is not None and self._start is not None:
             yield self._segment(finished, self._start, learn=learn)
         current = self._tracker.current
-        self._path = []
+        self._way = []
         self._start = None
         if current is not None:
             v, u = self._velocity.velocity, self._detector.command
@@ -236,13 +241,16 @@ class _Follower:
     def _segment(self, finished: FinishedPrimitive, start: Start, *, learn: bool) -> Segment:
         start_s, end_s = finished.primitive.start_s, finished.end_s
         long_enough = end_s - start_s >= self._shortest_s
-        n = len(start.q)
+        # position, velocity and lever of every sample on the way (k, 3, n)
+        way = np.array([seen for _, *seen in self._way]).reshape(-1, 3, len(start.q))
         return Segment(
             start=start,
             start_s=start_s,
             end_s=end_s,
             displacement=finished.displacement,
-            times_s=np.array([s.stamp_s for s in self._path]),
-            path=np.array([s.position for s in self._path]).reshape(-1, n),
+            times_s=np.array([t for t, *_ in self._way]),
+            path=way[:, 0],
+            velocities=way[:, 1],
+            commands=way[:, 2],
             complete=learn and finished.complete and long_enough,
         )

@@ -21,8 +21,12 @@ def primitive(
     path: Sequence[Sequence[float]] = (),
     times_s: Sequence[float] | None = None,
 ) -> Segment:
-    """A complete primitive of Ω ``category`` from ``q`` over ``x``, begun at 0 s."""
+    """A complete primitive of Ω ``category`` from ``q`` over ``x``, begun at 0 s.
+
+    The lever is held hard over and the arm at rest at every position of ``path``.
+    """
     start = np.asarray(q, dtype=np.float64)
+    way = np.array(path, dtype=np.float64).reshape(-1, len(start))
     return Segment(
         start=Start(
             category=category,
@@ -35,6 +39,8 @@ def primitive(
         end_s=duration_s,
         displacement=np.asarray(x, dtype=np.float64),
         times_s=np.array([0.1 * k for k in range(len(path))] if times_s is None else times_s),
-        path=np.array(path, dtype=np.float64).reshape(-1, len(start)),
+        path=way,
+        velocities=np.zeros_like(way),
+        commands=np.tile(np.array(category, dtype=np.float64), (len(way), 1)),
         complete=True,
     )

@@ -122,7 +122,11 @@ def test_what_is_known_at_the_start_and_seen_on_the_way() -> None:
     assert first.start.command[0] > 0.5
     assert first.times_s[0] >= first.start.time_s
     assert (np.diff(first.times_s) > 0.0).all()
-    assert first.path.shape == (len(first.times_s), 2)
+    shape = (len(first.times_s), 2)
+    assert first.path.shape == first.velocities.shape == first.commands.shape == shape
+    assert first.velocities[8] == pytest.approx([0.8, 0.0])
+    assert first.commands[8, 0] == pytest.approx(1.0, abs=0.01)
+    assert first.commands[-1, 0] < 0.2  # let go, and filtered
     # seen to the end, and through the debounce in which its end was not yet known
     assert first.times_s[-1] >= first.end_s
 
