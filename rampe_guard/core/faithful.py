@@ -118,7 +118,7 @@ class Faithful:
         """
         rows = self._rows(y)
         x = np.asarray(x, dtype=np.float64)
-        if x.shape != (self._n,) or not x.dot(x) < _LARGEST**2:
+        if x.shape != (self._n,) or not _moderate(x):
             raise ValueError(f"x={x} must be ({self._n},), finite and below {_LARGEST:g}")
         memory = self._memory.get(category)
         if memory is None:  # block 6: first time seen
@@ -191,14 +191,22 @@ class Faithful:
                 raise ValueError(f"snapshot has {name} {theirs.tolist()}, need {mine.tolist()}")
         categories = _integers(snapshot, "categories")
         counts = _integers(snapshot, "occurrences")
-        values = _entry(snapshot, "values").astype(np.float64)
+        values = _entry(snapshot, "values")
         if counts.ndim != 1 or categories.shape != (len(counts), self._n) or (counts < 1).any():
             raise ValueError(
                 f"snapshot has categories of shape {categories.shape}, occurrences {counts}"
             )
-        if values.ndim != 1 or not np.isfinite(values).all():
-            raise ValueError(f"snapshot has values of shape {values.shape}, not all finite")
-        unpacker = Unpacker(values, self._n, sum(self._sizes), self._n_init, learned=self._learned)
+        if values.ndim != 1 or values.dtype.kind != "f":
+            raise ValueError(f"snapshot has values {values.dtype} {values.shape}, need numbers")
+        if not np.isfinite(values).all():
+            raise ValueError("snapshot has values that are not finite")
+        unpacker = Unpacker(
+            np.asarray(values, dtype=np.float64),
+            self._n,
+            sum(self._sizes),
+            self._n_init,
+            learned=self._learned,
+        )
         memory: dict[Category, Memory] = {}
         for row, count in zip(categories.tolist(), counts.tolist(), strict=True):
             category = tuple(row)
@@ -276,13 +284,12 @@ class Faithful:
     def _rows(self, y: FloatArray) -> list[FloatArray]:
         """Distinct regressors at y, each checked."""
         y = np.asarray(y, dtype=np.float64)
-        # a comparison with nan is False too
-        if y.ndim != 1 or not y.dot(y) < _LARGEST**2:
+        if y.ndim != 1 or not _moderate(y):
             raise ValueError(f"y={y} must be one row, finite and below {_LARGEST:g}")
         rows = []
         for regressor, size in zip(self._distinct, self._sizes, strict=True):
             h = np.asarray(regressor(y), dtype=np.float64)
-            if h.shape != (size,) or not h.dot(h) < _LARGEST**2:
+            if h.shape != (size,) or not _moderate(h):
                 raise ValueError(
                     f"regressor {regressor} gave {h} for y={y},"
                     f" need ({size},), finite and below {_LARGEST:g}"
@@ -359,6 +366,13 @@ def _row(group: Group, rows: list[FloatArray]) -> FloatArray:
     if group.owner is None:
         return rows[group.rows[0]]
     return np.concatenate([rows[i] for i in group.rows])
+
+
+def _moderate(v: FloatArray) -> bool:
+    """Whether v (p,) is finite and of a size that can be squared."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        # one product is several times faster than isfinite; with nan it is False too
+        return bool(v.dot(v) < _LARGEST**2)
 
 
 def _entry(snapshot: Mapping[str, npt.NDArray[np.generic]], name: str) -> npt.NDArray[np.generic]:

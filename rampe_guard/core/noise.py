@@ -48,6 +48,7 @@ class Weighting:
         values: eigenvalues of C⁻¹ (n,).
         vectors: its eigenvectors (n, n), one a column.
         relative: each eigenvalue as a share of the largest of its component (n,).
+        least: the smallest of them.
         components: actuators that R couples, directly or through others.
     """
 
@@ -57,6 +58,7 @@ class Weighting:
     values: FloatArray
     vectors: FloatArray
     relative: FloatArray
+    least: float
     components: tuple[IndexArray, ...]
 
     def restricted(self, actuators: IndexArray) -> Weighting:
@@ -100,7 +102,9 @@ def weighting(covariance: FloatArray, *, coupled: bool = False) -> Weighting:
             raise ValueError(f"R must be positive definite, is {r.tolist()}")
         values[group], relative[group] = 1.0 / c, c[0] / c
     inverse = (vectors * values) @ vectors.T
-    return Weighting(r, deviation, inverse, values, vectors, relative, groups)
+    return Weighting(
+        r, deviation, inverse, values, vectors, relative, float(relative.min()), groups
+    )
 
 
 def _components(correlation: FloatArray) -> tuple[IndexArray, ...]:

@@ -104,8 +104,8 @@ class Shared:
         u, s, vt = np.linalg.svd(h, full_matrices=False)
         s = np.maximum(s, np.finfo(np.float64).tiny)  # division of what is cut below
         kept = _uncut(w, s * s, _at_least_rounding(tol, h.shape[1]))
-        r = kept * (w.vectors.T @ (x / w.deviation).T @ u) / s
-        theta = w.deviation[:, None] * (w.vectors @ r @ vt)
+        r = _where_uncut(x.T @ u, kept, w) / s
+        theta = r @ vt
         return Shared(np.ascontiguousarray(theta), np.ascontiguousarray(h.T @ h))
 
     def predict(self, h: FloatArray) -> FloatArray:
@@ -119,7 +119,7 @@ class Shared:
         moment = forgetting * self.moment + h[:, None] * h
         error = x - self.theta @ h
         tol = _at_least_rounding(tol, len(h))
-        factor = cholesky_if_uncut(moment, tol / w.relative.min())
+        factor = cholesky_if_uncut(moment, tol / w.least)
         if factor is not None:
             # (C⁻¹ ⊗ S)⁻¹ (C⁻¹ e ⊗ h) = e ⊗ S⁻¹h
             gain = lapack.dpotrs(factor, h)[0]
@@ -127,9 +127,8 @@ class Shared:
         s, v = np.linalg.eigh(moment)
         kept = _uncut(w, s, tol)
         along = (v.T @ h) / np.where(kept.any(axis=0), s, 1.0)
-        step = kept * ((w.vectors.T @ (error / w.deviation))[:, None] * along)
-        theta = self.theta + w.deviation[:, None] * (w.vectors @ step @ v.T)
-        return Shared(theta, moment)
+        step = _where_uncut(error[:, None] * along, kept, w)
+        return Shared(self.theta + step @ v.T, moment)
 
     def reweighted(self, w: Weighting, tol: float) -> Shared:
         """Of the same observations under another R: the same, for R cancels."""
@@ -155,6 +154,17 @@ def _uncut(w: Weighting, s: FloatArray, tol: float) -> npt.NDArray[np.bool_]:
     """Which products of eigenvalues of C⁻¹ and singular values s (p,) of S count: (n, p)."""
     uncut: npt.NDArray[np.bool_] = w.relative[:, None] * s > tol * s.max()
     return uncut
+
+
+def _where_uncut(a: FloatArray, kept: npt.NDArray[np.bool_], w: Weighting) -> FloatArray:
+    """Columns of a (n, p) [unit], of each that part which lies in the directions kept (n, p)."""
+    whole = kept * a
+    # where R decides what is kept, each direction is a mixture of actuators
+    split = kept.any(axis=0) & ~kept.all(axis=0)
+    if split.any():
+        mixed = w.vectors.T @ (a[:, split] / w.deviation[:, None])
+        whole[:, split] = w.deviation[:, None] * (w.vectors @ (kept[:, split] * mixed))
+    return whole
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,13 +8,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from rampe_guard.core.basis import Regressor, affine, constant, quadratic, subset
 from rampe_guard.core.faithful import Faithful
-from rampe_guard.core.noise import weighting
+from rampe_guard.core.noise import IndexArray, weighting
 from rampe_guard.core.rls import Shared, Stacked, cholesky_if_uncut, solve
 from rampe_guard.core.types import FloatArray
 
@@ -100,7 +101,7 @@ def parameters(model: Faithful, category: tuple[int, ...]) -> tuple[FloatArray, 
     return found
 
 
-def close(actual: FloatArray, expected: FloatArray, rtol: float = 1e-9) -> None:
+def close(actual: FloatArray, expected: npt.NDArray[np.floating], rtol: float = 1e-9) -> None:
     """Each value to ``rtol`` of the largest."""
     np.testing.assert_allclose(actual, expected, rtol=0, atol=rtol * np.abs(expected).max())
 
@@ -163,8 +164,9 @@ def test_rank_deficient_data_give_the_minimum_norm_solution(
     close(theta / unit[owner], expected, 1e-8)
 
 
-def shuffled(noise: FloatArray, order: FloatArray) -> FloatArray:
-    return noise[np.ix_(order, order)]
+def shuffled(noise: FloatArray, order: IndexArray) -> FloatArray:
+    swapped: FloatArray = noise[np.ix_(order, order)]
+    return swapped
 
 
 @given(structures, seeds, st.booleans(), forgettings)
@@ -262,23 +264,23 @@ class Own:
         return np.append(y, 1.0)
 
 
-@given(st.integers(2, 4), seeds, st.integers(1, 6), forgettings, st.booleans())
-@few
+@given(st.integers(2, 4), seeds, st.integers(1, 6), forgettings, st.sampled_from([1e-9, 0.02]))
+@settings(max_examples=150, deadline=None)
 def test_one_regressor_for_all_equals_the_stacked_system(
-    n: int, seed: int, n_init: int, forgetting: float, flat: bool
+    n: int, seed: int, n_init: int, forgetting: float, tol: float
 ) -> None:
     """The short way (``Shared``) and P in full, where singular values are cut and where not."""
     data = case([affine(3)] * n, seed, 12)
-    if flat:
+    if seed % 2:
         data.y[:, 1] = 2.0 * data.y[:, 0]  # never determined
     noise = full_noise(n, seed)
     full = Case([Own() for _ in range(n)], data.y, data.x)
-    a, b = data.model(n_init, forgetting, noise), full.model(n_init, forgetting, noise)
+    a, b = (c.model(n_init, forgetting, noise, tol) for c in (data, full))
     memories = (a._memory[data.category], b._memory[data.category])
     assert [type(m.states[0]) for m in memories] == [Shared, Stacked]
     (ta, pa), (tb, pb) = parameters(a, data.category), parameters(b, data.category)
     unit = np.repeat(1.0 / np.sqrt(noise.diagonal()), 4)
-    np.testing.assert_allclose(ta, tb, rtol=1e-5, atol=1e-5)
+    np.testing.assert_allclose(ta * unit, tb * unit, rtol=1e-5, atol=1e-5 * np.abs(ta * unit).max())
     np.testing.assert_allclose(pa / unit / unit[:, None], pb / unit / unit[:, None], atol=1e-9)
     va, vb = a.covariance(data.category, data.y[3]), b.covariance(data.category, data.y[3])
     assert va is not None
