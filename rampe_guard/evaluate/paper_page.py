@@ -83,14 +83,15 @@ def _experiment(report: Report) -> Iterable[str]:
         f" {done.minutes:.0f} simulated minutes, {report.primitives} primitives,"
         f" {done.corrections} corrections. Every estimate is made from the start of a primitive"
         f" and the earlier primitives of its category, before the true displacement is shown."
-        f" E = x \N{MINUS SIGN} x̂, regressor [q1, q2, 1].</p>"
+        f" E = x \N{MINUS SIGN} x̂.</p>"
     )
     yield (
         "<ul>"
-        f"<li><b>faithful</b>: the paper. x̂ = 0 for the first {N_INIT} occurrences, pseudo-inverse"
-        f" with tolerance {TOL:g}, degrees and metres as they are.</li>"
-        "<li><b>default</b>: the same recursion begun from a prior on scaled positions, never"
-        " against the sign of the category nor past a limit.</li>"
+        f"<li><b>faithful</b>: the paper. Regressor [q1, q2, 1] in degrees and metres, x̂ = 0 for the"
+        f" first {N_INIT} occurrences, pseudo-inverse with tolerance {TOL:g} (relative).</li>"
+        "<li><b>default</b>: what the guard uses, with its settings as they come. It begins from a"
+        " prior on scaled positions, estimates as soon as it can, and never goes against the sign"
+        " of the category nor past a limit.</li>"
         "<li><b>running mean</b>: the mean displacement of the category, wherever it began.</li>"
         f"</ul><p>Shares of the range are of {ranges}: the span of the targets.</p>"
     )
@@ -120,7 +121,7 @@ def _claims(report: Report) -> Iterable[str]:
 def _limits(report: Report) -> Iterable[str]:
     yield "<h3>Where the error is</h3>"
     lines = [
-        f"<li>{mode}: {sign_name(category)} bears {part:.0%} of the squared error.</li>"
+        f"<li>{mode}: {sign_name(category)} bears {part:.1%} of the squared error.</li>"
         for mode in MODES
         for category, part in list(report.squared[mode].items())[:1]
     ]
@@ -151,14 +152,14 @@ def _quantiles(report: Report) -> Iterable[str]:
         f"<p>|E| as a share of the range (root mean square over the actuators), all"
         f" {len(report.seeds)} runs.</p>"
     )
-    heads = ["after initialising", "median", "p90", "p99", "primitives"]
+    heads = ["after initialising", "median", "p90", "p99", "largest", "primitives"]
     yield _table(heads, [[p, *_quantile_cells(report.quantiles[p])] for p in PREDICTORS])
     heads[0] = "all occurrences"
     yield _table(heads, [[p, *_quantile_cells(report.quantiles_all[p])] for p in PREDICTORS])
 
 
 def _quantile_cells(q: ErrorQuantiles) -> list[str]:
-    return [*(_number(v) for v in (q.median, q.p90, q.p99)), str(q.count)]
+    return [*(_number(v) for v in (q.median, q.p90, q.p99, q.largest)), str(q.count)]
 
 
 def _figure(file: FigureFile, svg: bytes) -> str:

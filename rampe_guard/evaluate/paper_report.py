@@ -203,7 +203,7 @@ def _by_actuator(values: FloatArray | None, done: Experiment) -> dict[str, float
 
 
 def _quantiles_json(q: ErrorQuantiles) -> dict[str, float | int | None]:
-    values = {"median": q.median, "p90": q.p90, "p99": q.p99}
+    values = {"median": q.median, "p90": q.p90, "p99": q.p99, "largest": q.largest}
     return {**{k: _finite(v) for k, v in values.items()}, "primitives": q.count}
 
 

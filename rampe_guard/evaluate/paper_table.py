@@ -41,6 +41,7 @@ class ErrorQuantiles:
     median: float
     p90: float
     p99: float
+    largest: float
     count: int
 
 
@@ -63,9 +64,9 @@ def error_quantiles(
     """
     shares = np.concatenate([share(run, predictor, span, initialised=initialised) for run in runs])
     if not shares.size:
-        return ErrorQuantiles(np.nan, np.nan, np.nan, 0)
-    median, p90, p99 = np.quantile(shares, [0.5, 0.9, 0.99]).tolist()
-    return ErrorQuantiles(median, p90, p99, int(shares.size))
+        return ErrorQuantiles(np.nan, np.nan, np.nan, np.nan, 0)
+    median, p90, p99, largest = np.quantile(shares, [0.5, 0.9, 0.99, 1.0]).tolist()
+    return ErrorQuantiles(median, p90, p99, largest, int(shares.size))
 
 
 def share(run: Run, predictor: PredictorName, span: FloatArray, *, initialised: bool) -> FloatArray:

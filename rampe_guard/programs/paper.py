@@ -119,11 +119,11 @@ def _summary(report: Report) -> RenderableType:
 
 def _errors(report: Report) -> Table:
     table = _table("predictor")
-    for title in ("median", "p90", "p99"):
+    for title in ("median", "p90", "p99", "largest"):
         table.add_column(title, header_style="dim", justify="right")
     for predictor in PREDICTORS:
         q = report.quantiles[predictor]
-        table.add_row(predictor, *(_share(value) for value in (q.median, q.p90, q.p99)))
+        table.add_row(predictor, *(_share(value) for value in (q.median, q.p90, q.p99, q.largest)))
     return table
 
 

@@ -115,7 +115,7 @@ def test_who_bears_the_error_and_goes_two_ways_is_named() -> None:
     start = rng.normal([0.0, 2.79], [1.0, 0.01], (40, 2))
     x = np.column_stack([np.zeros(40), np.arange(40) % 2 * 0.17 + rng.normal(0.02, 0.004, 40)])
     text = written([made_run([(0, -1)] * 40, start, -x)])
-    assert f"default: {sign_name((0, -1))} bears 100% of the squared error" in text
+    assert f"default: {sign_name((0, -1))} bears 100.0% of the squared error" in text
     assert f"In 1 of 1 runs {sign_name((0, -1))} goes two ways from one place" in text
     assert "two ways" not in written(runs(right=True))
 

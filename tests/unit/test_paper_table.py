@@ -63,6 +63,7 @@ def test_quantiles_are_of_the_error_as_a_share_of_the_range() -> None:
     assert known.count == 5
     assert known.p90 == pytest.approx(6.6)
     assert known.p99 == pytest.approx(6.96)
+    assert known.largest == pytest.approx(7.0)
 
 
 def test_no_primitives_have_no_quantiles() -> None:
