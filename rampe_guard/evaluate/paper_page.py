@@ -87,8 +87,8 @@ def _experiment(report: Report) -> Iterable[str]:
     )
     yield (
         "<ul>"
-        f"<li><b>faithful</b>: the paper. Regressor [q1, q2, 1] in degrees and metres, x̂ = 0 for the"
-        f" first {N_INIT} occurrences, pseudo-inverse with tolerance {TOL:g} (relative).</li>"
+        f"<li><b>faithful</b>: the paper. Regressor [q1, q2, 1] in degrees and metres, x̂ = 0 for"
+        f" the first {N_INIT} occurrences, pseudo-inverse with tolerance {TOL:g} (relative).</li>"
         "<li><b>default</b>: what the guard uses, with its settings as they come. It begins from a"
         " prior on scaled positions, estimates as soon as it can, and never goes against the sign"
         " of the category nor past a limit.</li>"
