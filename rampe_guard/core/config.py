@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal, TypeAlias
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,31 +42,50 @@ class JoystickConfig:
 
 @dataclass(frozen=True, slots=True)
 class PriorConfig:
-    """What is believed of a category before it was seen, as shares of an actuator's range.
+    """What is believed of a category before it was seen.
 
     Attributes:
-        displacement: expected size of a displacement [share of the range].
-        spread: standard deviation of a displacement about its model [share of the range].
+        displacement: usual displacement of an actuator [share of its range].
+        spread: standard deviation of a displacement about its model [share of its size].
         weight: how many observations the belief in the mean is worth.
-        slope_weight: how many it is worth that displacement does not depend on position.
+        slope_weight: how many it is worth that displacement does not depend on position
+            (affine and quadratic basis).
     """
 
-    displacement: float = 0.15
-    spread: float = 0.07
+    displacement: float = 0.1
+    spread: float = 1.0
     weight: float = 0.5
     slope_weight: float = 0.5
 
 
+Basis: TypeAlias = Literal["affine", "quadratic", "radial"]
+Observation: TypeAlias = Literal["q", "time", "command_sum", "command", "speed"]
+
+
 @dataclass(frozen=True, slots=True)
 class RampeConfig:
-    """The estimator: first forecast after ``n_init`` occurrences, forgetting factor λ, prior."""
+    """The estimator.
 
-    n_init: int = 3
-    basis: str = "affine"
-    forgetting: float = 1.0
-    tol: float = 1e-9
+    Attributes:
+        n_init: own occurrences of a category before its first forecast; with 0, categories
+            never seen borrow from related ones.
+        basis: what x depends on, for all actuators or one for each.
+        forgetting: weight λ of an occurrence after each later one of its category.
+        memory: newest occurrences that a category remembers.
+        borrow: correlation of categories that differ in one actuator; 0 for none.
+        two_futures_from: occurrences from which a category may have two futures.
+        prior: belief before the first occurrence.
+        observations: what the regressor sees at the start of a primitive.
+    """
+
+    n_init: int = 0
+    basis: Basis | tuple[Basis, ...] = "radial"
+    forgetting: float = 0.98
+    memory: int = 32
+    borrow: float = 0.5
+    two_futures_from: int = 8
     prior: PriorConfig = field(default_factory=PriorConfig)
-    observations: tuple[str, ...] = ("q",)
+    observations: tuple[Observation, ...] = ("q",)
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,7 +38,21 @@ class Evidence:
 
 @dataclass(frozen=True, slots=True)
 class PredictionSummary:
-    """The forecast of the primitive under way, as alerts and predictions carry it."""
+    """The forecast of the primitive under way, as alerts and predictions carry it.
+
+    Attributes:
+        category: Ω.
+        occurrences: primitives of this category learned.
+        mean: expected displacement (n,) [unit]; None while nothing is known.
+        scale: Student-t scale (n,) [unit].
+        dof: Student-t degrees of freedom (n,).
+        start: q[k] (n,) [unit].
+        endpoint: where it likely ends (n,) [unit].
+        progress: displacement so far, or in the end (n,) [unit].
+        related: categories that the forecast borrows from.
+        endpoints: both ends where two futures were seen (2, n) [unit], likelier first.
+        endpoint_shares: their shares (2,) [-].
+    """
 
     category: Category
     occurrences: int
@@ -48,6 +62,9 @@ class PredictionSummary:
     start: FloatArray
     endpoint: FloatArray | None
     progress: FloatArray
+    related: tuple[Category, ...] = ()
+    endpoints: FloatArray | None = None
+    endpoint_shares: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,13 +104,14 @@ class PredictionEvent:
     """A primitive started or ended, or its forecast changed.
 
     When it ended, ``prediction.progress`` is its displacement x, and ``learned`` says
-    whether the model took it.
+    whether the model took it; if not, ``refusal`` is a word for why.
     """
 
     event: Literal["started", "updated", "ended"]
     seq: int
     prediction: PredictionSummary
     learned: bool
+    refusal: str | None
     sweeps: tuple[SweepSummary, ...]
     stamp_s: float
     now_s: float

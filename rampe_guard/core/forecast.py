@@ -10,9 +10,8 @@ It needs no learning and is the floor under everything.
 
 *Intent*: on to q[k] + x of the primitive under way. x is uncertain, so the path leads to the
 displacement that is exceeded with a small probability, and the place of a contact on it gives
-the probability that the operator goes that far: with progress p already made,
-
-    P(X ≥ d | X ≥ p) = S(d) / S(p),   S the survival function of the Student-t of x.
+the probability that the operator goes that far, given his progress, lever and speed
+(`displacement.DisplacementForecast.passing`).
 
 Actuators are taken to overshoot together (one quantile level for all): that keeps the path
 straight and overestimates rather than underestimates the reach of the arm.
@@ -24,15 +23,13 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from scipy.special import stdtr, stdtrit
 
 from rampe_guard.core.config import ActuatorConfig
+from rampe_guard.core.displacement import DisplacementForecast
+from rampe_guard.core.passing import UnderWay
 from rampe_guard.core.primitive import Primitive
-from rampe_guard.core.rampe import DisplacementForecast
 from rampe_guard.core.types import FloatArray
 
-_SMALLEST_SURVIVAL = 1e-9
-"""Beyond this the operator has left all experience behind: no more is foreseen."""
 _TINY = 1e-12
 _CREEP_SHARE = 0.05
 """Slowest speed, as a share of the top speed, with which a time to collision is reckoned."""
@@ -81,31 +78,26 @@ class IntentForecast:
 
     Attributes:
         displacement: (n,) to the far quantile [unit].
-        sign: Ω (n,).
         progress: distance already made along Ω (n,) [unit].
-        mean, scale, dof: predictive Student-t of |x| (n,).
+        belief: distribution of the displacement.
+        under_way: lever and speed now, or None if they say nothing.
         duration_s: time the path takes [s].
-        occurrences: how many primitives stand behind it.
     """
 
     displacement: FloatArray
-    sign: FloatArray
     progress: FloatArray
-    mean: FloatArray
-    scale: FloatArray
-    dof: FloatArray
+    belief: DisplacementForecast
+    under_way: UnderWay | None
     duration_s: float
-    occurrences: int
 
     def probability_at(self, fraction: float) -> float:
-        """P that the operator goes at least ``fraction`` of the path, given his progress."""
-        active = (self.sign != 0.0) & (self.displacement != 0.0)
+        """P that the operator goes at least ``fraction`` of the path, given what he did so far."""
+        active = self.displacement != 0.0
         if not active.any():
             return 0.0
-        d = self.progress + fraction * np.abs(self.displacement)
-        here = _survival(self.progress, self.mean, self.scale, self.dof)
-        there = _survival(d, self.mean, self.scale, self.dof)
-        return float(np.clip((there[active] / np.maximum(here[active], 1e-300)).min(), 0.0, 1.0))
+        distance = self.progress + fraction * np.abs(self.displacement)
+        passing = self.belief.passing(distance, self.progress, self.under_way)
+        return float(np.clip(passing[active].min(), 0.0, 1.0))
 
     def time_at(self, fraction: float) -> float:
         """Time [s] at which ``fraction`` of the path is reached."""
@@ -166,27 +158,20 @@ class Forecaster:
         velocity: FloatArray,
         command: FloatArray,
         primitive: Primitive,
-        forecast: DisplacementForecast,
+        belief: DisplacementForecast,
+        under_way: UnderWay | None = None,
     ) -> IntentForecast:
         """Intent path from q (n,) to the far quantile of the primitive under way."""
         sign = np.array(primitive.category, dtype=np.float64)
         progress = np.maximum(sign * (q - primitive.start), 0.0)
-        mean = np.abs(forecast.mean)
-        here = _survival(progress, mean, forecast.scale, forecast.dof)
-        known = here > _SMALLEST_SURVIVAL
-        level = np.clip(self._tail * here, _SMALLEST_SURVIVAL, 1.0 - 1e-12)
-        far = mean - forecast.scale * stdtrit(forecast.dof, level)  # isf of a symmetric law
-        ahead = np.where(known, np.maximum(far - progress, 0.0), 0.0)
-        displacement = self._within(q, sign * ahead)
+        far = belief.reach(self._tail, progress, under_way)
+        displacement = self._within(q, sign * (far - progress))
         return IntentForecast(
             displacement=displacement,
-            sign=sign,
             progress=progress,
-            mean=mean,
-            scale=forecast.scale,
-            dof=forecast.dof,
+            belief=belief,
+            under_way=under_way,
             duration_s=self._duration(displacement, velocity, command),
-            occurrences=forecast.occurrences,
         )
 
     def _duration(
@@ -207,9 +192,3 @@ class Forecaster:
         low = np.minimum(self._limits[:, 0] - q, 0.0)
         high = np.maximum(self._limits[:, 1] - q, 0.0)
         return np.clip(displacement, low, high)
-
-
-def _survival(d: FloatArray, mean: FloatArray, scale: FloatArray, dof: FloatArray) -> FloatArray:
-    """S(d) of the Student-t, elementwise."""
-    result: FloatArray = stdtr(dof, (mean - d) / scale)
-    return result

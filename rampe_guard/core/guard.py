@@ -154,7 +154,8 @@ class Guard:
             self._machine_s += moved.sample.stamp_s - self._newest.stamp_s
         self._newest = moved.sample
         self._velocity.update(moved.sample)
-        return [*self._intention.actuators(moved.sample, now_s, learn=learn)]
+        v = self._velocity.velocity
+        return [*self._intention.actuators(moved.sample, v, now_s, learn=learn)]
 
     def _refuse(self, name: InputName, reason: str, now_s: float) -> None:
         self._monitor.reject(name, reason, now_s)
@@ -171,7 +172,9 @@ class Guard:
         forecasts: list[Forecast] = [stopping]
         current, known = self._intention.current, self._intention.forecast
         if current is not None and known is not None:
-            forecasts.append(self._forecaster.intent(q, v, u, current, known))
+            forecasts.append(
+                self._forecaster.intent(q, v, u, current, known, self._intention.under_way())
+            )
         stop_s = max(stopping.stop_s, self._reaction_s)
         evidence: dict[str, list[Evidence]] = {}
         sweeps = []

@@ -8,15 +8,23 @@ from __future__ import annotations
 
 from typing import Literal
 
+import numpy as np
+
 from rampe_guard.core.config import GuardConfig
+from rampe_guard.core.displacement import DisplacementForecast
 from rampe_guard.core.events import PredictionEvent, PredictionSummary, SweepSummary
 from rampe_guard.core.joystick import CategoryChange, CategoryDetector
+from rampe_guard.core.passing import Moment, UnderWay
 from rampe_guard.core.primitive import FinishedPrimitive, Primitive, PrimitiveTracker
-from rampe_guard.core.rampe import DisplacementForecast, Rampe
+from rampe_guard.core.rampe import Rampe
+from rampe_guard.core.start_observer import StartObserver
 from rampe_guard.core.types import ActuatorSample, FloatArray, JoystickSample
 
 _UPDATE_S = 0.2
 """Shortest time between two updates of one prediction [s]."""
+_MOMENT_S = 0.1
+"""Time between two moments that are kept of a primitive under way [s]."""
+_MOST_MOMENTS = 100
 
 
 class Intention:
@@ -31,18 +39,23 @@ class Intention:
         self._detector = CategoryDetector(config.actuators, config.joystick)
         self._tracker = PrimitiveTracker()
         self._shortest_s = config.joystick.debounce_s
+        self._top = np.array([a.max_velocity for a in config.actuators])
+        self._observer = StartObserver(len(config.actuators), config.rampe.observations)
         self.rampe = Rampe(
             len(config.actuators),
-            n_init=config.rampe.n_init,
-            tol=config.rampe.tol,
-            forgetting=config.rampe.forgetting,
             limits=limits,
-            prior=config.rampe.prior,
+            config=config.rampe,
+            observations=self._observer.size,
         )
         self.forecast: DisplacementForecast | None = None
         self._seq = 0
         self._updated_s = float("-inf")
         self._stamp_s = 0.0
+        self._velocity = np.zeros(len(config.actuators))
+        self._xi = np.zeros(self._observer.size)
+        self._peak = np.zeros(len(config.actuators))
+        self._moments: list[Moment] = []
+        self._moment_s = float("-inf")
 
     @property
     def current(self) -> Primitive | None:
@@ -54,6 +67,14 @@ class Intention:
         """Filtered command per actuator (n,) [-]."""
         return self._detector.command
 
+    def under_way(self) -> UnderWay | None:
+        """Lever and speed as they bear on the primitive under way, or None without one."""
+        if self.current is None:
+            return None
+        sign = np.array(self.current.category, dtype=np.float64)
+        speed = np.clip(sign * self._velocity / self._top, 0.0, 1.0)
+        return UnderWay(np.abs(self.command), self._peak.copy(), speed)
+
     def joystick(
         self, sample: JoystickSample, now_s: float, *, learn: bool
     ) -> list[PredictionEvent]:
@@ -63,13 +84,17 @@ class Intention:
         return self._changed(change, now_s, learn=learn)
 
     def actuators(
-        self, sample: ActuatorSample, now_s: float, *, learn: bool
+        self, sample: ActuatorSample, velocity: FloatArray, now_s: float, *, learn: bool
     ) -> list[PredictionEvent]:
-        """Take a position sample."""
+        """Take a position sample, with the velocity (n,) [unit/s] at it."""
         self._stamp_s = sample.stamp_s
+        self._velocity = velocity
         self._tracker.position(sample.stamp_s, sample.position)
         change = self._detector.advance(sample.stamp_s)
-        return self._changed(change, now_s, learn=learn)
+        self._observer.update(sample.stamp_s, self.command, velocity / self._top)
+        events = self._changed(change, now_s, learn=learn)
+        self._keep_moment(sample)
+        return events
 
     def interrupt(self) -> None:
         """Something was missing: the primitive under way will not be learned."""
@@ -79,6 +104,7 @@ class Intention:
         """A sender started anew: forget the primitive under way, keep what was learned."""
         self._tracker.reset()
         self._detector.reset()
+        self._observer.pause()
         self.forecast = None
 
     def summary(self, q: FloatArray) -> PredictionSummary | None:
@@ -103,22 +129,45 @@ class Intention:
         events = []
         finished = self._tracker.change(change)
         if finished is not None:
-            learned = learn and self._learn(finished)
+            refusal = self._learn(finished) if learn else "inputs_refused"
             summary = self._summary(finished.primitive, finished.displacement)
-            events.append(self._event("ended", summary, now_s, learned=learned))
+            events.append(self._event("ended", summary, now_s, refusal=refusal))
         self.forecast = None
+        self._peak = np.zeros(len(self._top))
+        self._moments, self._moment_s = [], float("-inf")
         current = self._tracker.current
         if current is not None:
-            self.forecast = self.rampe.predict(current.category, current.start)
+            self._xi = self._observer.start()
+            self.forecast = self.rampe.predict(current.category, current.start, self._xi)
             events.append(self._event("started", self._summary(current, current.start * 0), now_s))
         return events
 
-    def _learn(self, finished: FinishedPrimitive) -> bool:
+    def _keep_moment(self, sample: ActuatorSample) -> None:
+        """Remember what lever and speed were: how it ends will say what they meant."""
+        current, known = self.current, self.forecast
+        self._peak = np.maximum(self._peak, np.abs(self.command))
+        if current is None or known is None or len(self._moments) >= _MOST_MOMENTS:
+            return
+        under_way = self.under_way()
+        if under_way is None or sample.stamp_s - self._moment_s < _MOMENT_S:
+            return
+        self._moment_s = sample.stamp_s
+        sign = np.array(current.category, dtype=np.float64)
+        progress = np.maximum(sign * (sample.position - current.start), 0.0)
+        self._moments.append(Moment(progress, under_way))
+
+    def _learn(self, finished: FinishedPrimitive) -> str | None:
+        """Learn a finished primitive; returns why not, if it was not."""
         primitive = finished.primitive
-        if not finished.complete or finished.end_s - primitive.start_s < self._shortest_s:
-            return False
-        self.rampe.observe(primitive.category, primitive.start, finished.displacement)
-        return True
+        if not finished.complete:
+            return "incomplete"
+        if finished.end_s - primitive.start_s < self._shortest_s:
+            return "too_short"
+        x = finished.displacement
+        refusal = self.rampe.observe(primitive.category, primitive.start, x, self._xi)
+        if refusal is None and self.forecast is not None:
+            self.rampe.learn_passing(self.forecast, self._moments, x)
+        return refusal
 
     def _summary(self, primitive: Primitive, progress: FloatArray) -> PredictionSummary:
         known = self.forecast
@@ -129,8 +178,13 @@ class Intention:
             scale=None if known is None else known.scale,
             dof=None if known is None else known.dof,
             start=primitive.start,
-            endpoint=None if known is None else primitive.start + known.mean,
+            endpoint=None if known is None else primitive.start + known.likeliest,
             progress=progress,
+            related=() if known is None else known.related,
+            endpoints=None
+            if known is None or known.modes is None
+            else primitive.start + known.modes,
+            endpoint_shares=None if known is None or known.modes is None else known.mode_weights,
         )
 
     def _event(
@@ -140,8 +194,11 @@ class Intention:
         now_s: float,
         sweeps: tuple[SweepSummary, ...] = (),
         *,
-        learned: bool = False,
+        refusal: str | None = None,
     ) -> PredictionEvent:
         self._seq += 1
         self._updated_s = now_s
-        return PredictionEvent(event, self._seq, summary, learned, sweeps, self._stamp_s, now_s)
+        learned = event == "ended" and refusal is None
+        return PredictionEvent(
+            event, self._seq, summary, learned, refusal, sweeps, self._stamp_s, now_s
+        )

@@ -1,66 +1,55 @@
-"""RAMPE: per category Ω, learn the displacement x of a primitive from its start q[k].
+"""RAMPE: per category Ω, learn the displacement x of a primitive from its start.
 
-Flow-chart blocks 5 to 19 (Fig. 4, Table I) are named where they happen. Two modes:
+Two modes behind one face:
 
-* ``faithful``: the paper. No estimate before ``n_init`` occurrences, then Θ̂ and P from the
-  stacked first observations, then the recursion (2) to (4).
-* ``bayesian`` (default): the same recursion begun from a Gaussian prior on Θ, with q centred
-  and scaled by its range. The noise variance of each actuator is learned too
-  (normal-inverse-gamma), so that a prediction is a Student-t per actuator:
-
-      x ~ t(dof 2a, location hΘ̂, scale² = (b/a)·(1 + h P⁻¹ hᵀ))
-
-  Begun before a first observation, it has no ill-conditioned start: where occurrences lie
-  almost on a line, the prior decides what the data cannot.
+* ``faithful`` (`core.faithful`): the paper to the letter, for the reproduction and for checks.
+* ``bayesian`` (default, `core.adaptive`): the same least squares begun from a prior on scaled
+  observations, with a predictive distribution, borrowing, and refusal of bad data.
 
 Only categories that were seen cost memory.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 
-from rampe_guard.core.config import PriorConfig
-from rampe_guard.core.rls import LeastSquares, from_batch, pseudo_inverse
+from rampe_guard.core.adaptive import Adaptive
+from rampe_guard.core.adaptive_state import restore, snapshot
+from rampe_guard.core.basis import Regressor
+from rampe_guard.core.config import Basis, PriorConfig, RampeConfig
+from rampe_guard.core.displacement import DisplacementForecast
+from rampe_guard.core.faithful import Faithful
+from rampe_guard.core.passing import Moment
+from rampe_guard.core.screening import Refusal
 from rampe_guard.core.types import Category, FloatArray
 
-_PRIOR_SHAPE = 1.5
-"""a₀: three degrees of freedom, the fewest with a finite variance (of a scaled t)."""
+__all__ = ["CategoryRow", "DisplacementForecast", "Rampe"]
+
+_N_INIT = 3
+"""Of the paper's test."""
+_SIGNS = frozenset((-1, 0, 1))
 
 
 @dataclass(frozen=True, slots=True)
-class DisplacementForecast:
-    """Predictive distribution of x: Student-t per actuator.
+class CategoryRow:
+    """One category, for people.
 
     Attributes:
-        mean: location (n,) [unit], never against the sign of Ω.
-        scale: scale (n,) [unit]; nan in faithful mode, which knows no spread.
-        dof: degrees of freedom (n,); nan in faithful mode.
-        occurrences: primitives of this category seen so far.
+        category: Ω.
+        occurrences: primitives learned.
+        mean_displacement: mean of the remembered ones (n,) [unit].
+        spread: their standard deviation (n,) [unit].
     """
 
-    mean: FloatArray
-    scale: FloatArray
-    dof: FloatArray
+    category: Category
     occurrences: int
-
-
-@dataclass(frozen=True, slots=True)
-class CategoryMemory:
-    """What is known of one category: the recursion, the noise (a, b (n,)) and a count.
-
-    ``first_h`` and ``first_x`` hold the observations of the initialising phase (faithful).
-    """
-
-    fit: LeastSquares | None
-    shape: float
-    rate: FloatArray
-    occurrences: int
-    first_h: tuple[FloatArray, ...] = ()
-    first_x: tuple[FloatArray, ...] = ()
+    mean_displacement: FloatArray
+    spread: FloatArray
 
 
 class Rampe:
@@ -69,121 +58,196 @@ class Rampe:
     Args:
         actuators: n.
         mode: "bayesian" or "faithful".
-        n_init: occurrences of a category before its first estimate.
-        tol: relative threshold of the pseudo-inverse.
-        forgetting: λ in (0, 1].
-        limits: (n, 2) [unit], scales q and bounds predictions; unlimited if None or infinite.
+        n_init: own occurrences before the first forecast of a category (faithful: 3; bayesian:
+            0, a category never seen borrows from related ones).
+        tol: relative threshold of the pseudo-inverse (faithful).
+        forgetting: λ in (0, 1] (faithful: 1; bayesian: 0.98).
+        limits: (n, 2) [unit], scale q and bound predictions; None or infinite without.
         prior: what is believed before the first occurrence (bayesian).
+        basis: "affine", "quadratic" or "radial", or one for each actuator (bayesian).
+        config: all settings of the bayesian mode at once, instead of those above.
+        observations: length of ξ, what is observed beside q.
+        regressors: h_j(y) per actuator (faithful); affine in y for all if None.
+        noise: R (n, n), R per category, or "learned" (faithful); identity if None.
+
+    Raises:
+        ValueError: a setting that cannot be.
     """
 
     def __init__(
         self,
         actuators: int,
         mode: Literal["bayesian", "faithful"] = "bayesian",
-        n_init: int = 3,
+        n_init: int | None = None,
         tol: float = 1e-9,
-        forgetting: float = 1.0,
-        limits: FloatArray | None = None,
+        forgetting: float | None = None,
+        limits: npt.ArrayLike | None = None,
         prior: PriorConfig | None = None,
+        *,
+        basis: Basis | Sequence[Basis] | None = None,
+        config: RampeConfig | None = None,
+        observations: int = 0,
+        regressors: Sequence[Regressor] | None = None,
+        noise: FloatArray | Mapping[Category, FloatArray] | Literal["learned"] | None = None,
     ) -> None:
-        if not 0.0 < forgetting <= 1.0:
-            raise ValueError(f"forgetting is {forgetting}, must lie in (0, 1]")
-        if limits is not None and limits.shape != (actuators, 2):
-            raise ValueError(f"limits have shape {limits.shape}, need ({actuators}, 2)")
         self._n = actuators
+        self._observations = observations
         self._mode = mode
-        self._n_init = n_init
-        self._tol = tol
-        self._forgetting = forgetting
-        self._prior = prior or PriorConfig()
-        bounds = np.tile([-np.inf, np.inf], (actuators, 1)) if limits is None else limits
-        self._limits = bounds
-        bounded = np.isfinite(bounds).all(axis=1)
-        # an actuator without limits is a slew or a wheel: half a turn is its natural scale
-        half = np.full(actuators, np.pi)
-        half[bounded] = (bounds[bounded, 1] - bounds[bounded, 0]) / 2
-        self._half = half
-        self._center = np.zeros(actuators)
-        self._center[bounded] = bounds[bounded].mean(axis=1)
-        self._memory: dict[Category, CategoryMemory] = {}
+        bounds = np.tile([-np.inf, np.inf], (actuators, 1))
+        if limits is not None:
+            bounds = np.asarray(limits, dtype=np.float64)
+        if bounds.shape != (actuators, 2):
+            raise ValueError(f"limits have shape {bounds.shape}, need ({actuators}, 2)")
+        if forgetting is not None and not 0.0 < forgetting <= 1.0:
+            raise ValueError(f"forgetting is {forgetting}, must lie in (0, 1]")
+        self._faithful: Faithful | None = None
+        self._adaptive: Adaptive | None = None
+        if mode == "faithful":
+            self._faithful = Faithful(
+                actuators,
+                regressors=regressors,
+                n_init=_N_INIT if n_init is None else n_init,
+                tol=tol,
+                forgetting=1.0 if forgetting is None else forgetting,
+                noise=noise,
+            )
+        elif mode == "bayesian":
+            settings = config or RampeConfig()
+            if n_init is not None:
+                settings = replace(settings, n_init=n_init)
+            if forgetting is not None:
+                settings = replace(settings, forgetting=forgetting)
+            if prior is not None:
+                settings = replace(settings, prior=prior)
+            if basis is not None:
+                settings = replace(
+                    settings, basis=basis if isinstance(basis, str) else tuple(basis)
+                )
+            self._adaptive = Adaptive(actuators, bounds, settings, observations)
+        else:
+            raise ValueError(f"mode is {mode!r}, must be 'bayesian' or 'faithful'")
 
     @property
     def categories(self) -> dict[Category, int]:
         """Occurrences per category seen."""
-        return {c: m.occurrences for c, m in self._memory.items()}
+        if self._adaptive is not None:
+            return {
+                c: e.occurrences for c, e in self._adaptive.experiences.items() if e.occurrences
+            }
+        return dict(self._model.categories)
 
-    def predict(self, category: Category, q: FloatArray) -> DisplacementForecast | None:
-        """Blocks 16 and 19: x̂ at the start q (n,) of a primitive; None before ``n_init``."""
-        memory = self._memory.get(category)
-        if memory is None or memory.occurrences < self._n_init or memory.fit is None:
-            return None  # block 5: still initialising
-        h = self._regressor(q)
-        mean = memory.fit.predict(h)
-        if self._mode == "faithful":
-            unknown = np.full(self._n, np.nan)
-            return DisplacementForecast(mean, unknown, unknown, memory.occurrences)
-        spread = 1.0 + float(h @ pseudo_inverse(memory.fit.precision, self._tol) @ h)
-        scale = np.sqrt(memory.rate / memory.shape * spread)
-        dof = np.full(self._n, 2.0 * memory.shape)
-        return DisplacementForecast(self._bound(category, q, mean), scale, dof, memory.occurrences)
+    @property
+    def refused(self) -> dict[str, int]:
+        """Primitives that were not learned, by reason (see `core.screening`)."""
+        return {} if self._adaptive is None else dict(self._adaptive.refused)
 
-    def observe(self, category: Category, q: FloatArray, x: FloatArray) -> None:
-        """Blocks 6 to 15, 17 and 18: learn that the primitive from q (n,) went x (n,).
+    def predict(
+        self, category: Category, q: npt.ArrayLike, xi: npt.ArrayLike = ()
+    ) -> DisplacementForecast | None:
+        """Blocks 16 and 19: forecast at the start q (n,), with ξ if the estimator has any.
+
+        Returns:
+            The forecast; None before ``n_init`` occurrences, and while nothing is known.
 
         Raises:
-            ValueError: q or x have the wrong length or are not finite; nothing is learned.
+            ValueError: a wrong length, or Ω is no category of these actuators.
         """
-        if q.shape != (self._n,) or x.shape != (self._n,):
-            raise ValueError(f"q and x have shapes {q.shape} and {x.shape}, need ({self._n},)")
-        if not (np.isfinite(q).all() and np.isfinite(x).all()):
-            raise ValueError(f"q={q} and x={x} must be finite")
-        h = self._regressor(q)
-        memory = self._memory.get(category) or self._begin(category)  # block 6
-        if memory.fit is None:
-            updated = self._initialise(memory, h, x)
-        else:
-            updated = self._recurse(memory, memory.fit, h, x)
-        self._memory[category] = replace(updated, occurrences=memory.occurrences + 1)  # 17, 18
-
-    def _begin(self, category: Category) -> CategoryMemory:
-        if self._mode == "faithful":
-            return CategoryMemory(None, np.nan, np.full(self._n, np.nan), 0)
-        prior = self._prior
-        theta = np.zeros((self._n + 1, self._n))
-        theta[-1] = np.array(category) * prior.displacement * 2 * self._half
-        weights = np.append(np.full(self._n, prior.slope_weight), prior.weight)
-        variance = (prior.spread * 2 * self._half) ** 2
-        fit = LeastSquares(theta, np.diag(weights))
-        return CategoryMemory(fit, _PRIOR_SHAPE, _PRIOR_SHAPE * variance, 0)
-
-    def _initialise(self, memory: CategoryMemory, h: FloatArray, x: FloatArray) -> CategoryMemory:
-        first_h, first_x = (*memory.first_h, h), (*memory.first_x, x)  # blocks 7 and 8
-        if len(first_h) < self._n_init:
-            return replace(memory, first_h=first_h, first_x=first_x)
-        weights = np.sqrt(self._forgetting ** np.arange(len(first_h) - 1, -1, -1.0))[:, None]
-        fit = from_batch(weights * first_h, weights * first_x, self._tol)  # blocks 9 to 12
-        return replace(memory, fit=fit, first_h=(), first_x=())
-
-    def _recurse(
-        self, memory: CategoryMemory, fit: LeastSquares, h: FloatArray, x: FloatArray
-    ) -> CategoryMemory:
-        lam = self._forgetting
-        inverse = pseudo_inverse(lam * fit.precision, self._tol)
-        surprise = (x - fit.predict(h)) ** 2 / (1.0 + float(h @ inverse @ h))
-        return replace(
-            memory,
-            fit=fit.update(h, x, lam, self._tol),  # blocks 13 to 15
-            shape=_PRIOR_SHAPE + lam * (memory.shape - _PRIOR_SHAPE) + 0.5,
-            rate=lam * memory.rate + 0.5 * surprise,
+        y = self._observation(category, q, xi)
+        if self._adaptive is not None:
+            return self._adaptive.predict(category, y)
+        model = self._model
+        mean = model.predict(category, y)
+        if mean is None:
+            return None
+        covariance = model.covariance(category, y)
+        unknown = np.full(self._n, np.nan)
+        return DisplacementForecast(
+            category,
+            mean,
+            scale=unknown,
+            dof=unknown,
+            occurrences=model.categories[category],
+            covariance=np.full((self._n, self._n), np.nan) if covariance is None else covariance,
         )
 
-    def _regressor(self, q: FloatArray) -> FloatArray:
-        if self._mode == "faithful":
-            return np.append(q, 1.0)
-        return np.append((q - self._center) / self._half, 1.0)
+    def observe(
+        self, category: Category, q: npt.ArrayLike, x: npt.ArrayLike, xi: npt.ArrayLike = ()
+    ) -> Refusal | None:
+        """Blocks 5 to 15, 17 and 18: learn that the primitive from q (n,) went x (n,).
 
-    def _bound(self, category: Category, q: FloatArray, mean: FloatArray) -> FloatArray:
-        """Never against the sign of Ω, never past a limit, no drift of a static actuator."""
-        sign = np.array(category, dtype=np.float64)
-        room = np.where(sign > 0, self._limits[:, 1] - q, q - self._limits[:, 0])
-        return sign * np.clip(sign * mean, 0.0, np.maximum(room, 0.0))
+        Returns:
+            None if it was learned, else why not (bayesian; counted in `refused`).
+
+        Raises:
+            ValueError: a wrong length, or Ω is no category of these actuators; faithful: a
+                value is not finite. Nothing is learned.
+        """
+        y = self._observation(category, q, xi)
+        moved = np.asarray(x, dtype=np.float64)
+        if moved.shape != (self._n,):
+            raise ValueError(f"x has shape {moved.shape}, need ({self._n},)")
+        if self._adaptive is not None:
+            return self._adaptive.observe(category, y, moved)
+        self._model.observe(category, y, moved)
+        return None
+
+    def learn_passing(
+        self, forecast: DisplacementForecast, moments: Sequence[Moment], x: FloatArray
+    ) -> None:
+        """Learn from a finished primitive what lever and speed said about its length.
+
+        Args:
+            forecast: that was made at its start.
+            moments: on the way, some 0.1 s apart.
+            x: its displacement (n,) [unit].
+        """
+        if self._adaptive is not None:
+            self._adaptive.learn_passing(forecast, moments, x)
+
+    def table(self) -> list[CategoryRow]:
+        """Every category seen, the most frequent first (bayesian)."""
+        if self._adaptive is None:
+            return []
+        rows = []
+        for category, own in self._adaptive.experiences.items():
+            if own.occurrences:
+                mean, spread = np.zeros(self._n), np.zeros(self._n)
+                signs = np.array(category, dtype=np.float64)[own.active]
+                mean[own.active] = signs * own.moves.mean(axis=0)
+                spread[own.active] = own.moves.std(axis=0)
+                rows.append(CategoryRow(category, own.occurrences, mean, spread))
+        return sorted(rows, key=lambda row: -row.occurrences)
+
+    def snapshot(self) -> dict[str, npt.NDArray[np.generic]]:
+        """All that was learned, as plain numeric arrays."""
+        return self._model.snapshot() if self._adaptive is None else snapshot(self._adaptive)
+
+    def restore(self, arrays: Mapping[str, npt.NDArray[np.generic]]) -> None:
+        """Go on where a `snapshot` was taken.
+
+        Raises:
+            ValueError: it is of another estimator, or damaged; nothing has changed then.
+        """
+        if self._adaptive is None:
+            self._model.restore(arrays)
+        else:
+            self._adaptive = restore(self._adaptive, arrays)
+
+    @property
+    def _model(self) -> Faithful:
+        if self._faithful is None:
+            raise AssertionError("one of the two modes is always there")
+        return self._faithful
+
+    def _observation(self, category: Category, q: npt.ArrayLike, xi: npt.ArrayLike) -> FloatArray:
+        """The vector y = [q, ξ], checked."""
+        y = np.concatenate((np.asarray(q, dtype=np.float64), np.asarray(xi, dtype=np.float64)))
+        if len(y) != self._n + self._observations:
+            raise ValueError(
+                f"q and ξ have {len(y)} values together, need {self._n} + {self._observations}"
+            )
+        if len(category) != self._n or not any(category) or not _SIGNS.issuperset(category):
+            raise ValueError(
+                f"category {category} is not {self._n} signs -1, 0, 1, one of them not 0"
+            )
+        return y

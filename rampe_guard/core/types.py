@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
+Indices: TypeAlias = npt.NDArray[np.intp]
 Category: TypeAlias = tuple[int, ...]
 """Ω: one sign in {-1, 0, +1} per actuator."""
 Point: TypeAlias = tuple[float, float, float]

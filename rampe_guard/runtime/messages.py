@@ -95,6 +95,8 @@ class Scribe:
             **self._told(event.prediction),
             displacement=self._by_name(event.prediction.progress) if ended else None,
             learned=event.learned if ended else None,
+            not_learned=event.refusal,
+            endpoints=self._endpoints(event.prediction),
             any_path=None,
             sweeps=tuple(_sweep(s) for s in event.sweeps),
             stamp=event.stamp_s,
@@ -118,6 +120,7 @@ class Scribe:
     def _told(self, told: PredictionSummary) -> dict[str, Any]:
         return {
             "category": told.category,
+            "borrowed_from": told.related,
             "observations": told.occurrences,
             "mean": self._by_name(told.mean),
             "scale": self._by_name(told.scale),
@@ -126,6 +129,14 @@ class Scribe:
             "endpoint": self._by_name(told.endpoint),
             "progress": self._by_name(told.progress),
         }
+
+    def _endpoints(self, told: PredictionSummary) -> tuple[wire.Endpoint, ...]:
+        if told.endpoints is None or told.endpoint_shares is None:
+            return ()
+        return tuple(
+            wire.Endpoint(position=self._by_name(end) or {}, share=float(share))
+            for end, share in zip(told.endpoints, told.endpoint_shares, strict=True)
+        )
 
     def _by_name(self, values: FloatArray | None) -> dict[str, float] | None:
         if values is None:

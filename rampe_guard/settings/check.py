@@ -21,6 +21,7 @@ def check(model: SiteModel, problems: Problems) -> None:
     if model.alerts.caution_probability > model.alerts.warning_probability:
         what = f"{model.alerts.caution_probability:g} is greater than warning_probability"
         problems.add(("alerts", "caution_probability"), what, "give at most that probability")
+    _rampe(model, problems)
     _actuators(model.arm, problems)
     _linkages(model.arm, problems)
     if model.log is not None:
@@ -70,6 +71,17 @@ def _zenoh(model: SiteModel, problems: Problems) -> None:
     elif zenoh.connect == ():
         what = "names no endpoint, and scouting is off"
         problems.add(("zenoh", "connect"), what, "give one, such as tcp/127.0.0.1:7447")
+
+
+def _rampe(model: SiteModel, problems: Problems) -> None:
+    basis, n = model.rampe.basis, len(model.arm.actuators)
+    if not isinstance(basis, str) and len(basis) != n:
+        what = f"has {len(basis)} entries for {n} actuators"
+        problems.add(("rampe", "basis"), what, "give one for all, or one for each in their order")
+    seen = model.rampe.observations
+    if seen[0] != "q" or len(set(seen)) != len(seen):
+        what = f"is {', '.join(seen)}"
+        problems.add(("rampe", "observations"), what, "begin with q and name each at most once")
 
 
 def _actuators(arm: ArmModel, problems: Problems) -> None:

@@ -8,8 +8,10 @@ from pydantic import Field
 
 from rampe_guard.core.config import (
     AlertConfig,
+    Basis,
     InputConfig,
     JoystickConfig,
+    Observation,
     PriorConfig,
     RampeConfig,
     StoppingConfig,
@@ -29,7 +31,7 @@ _Steps = Annotated[int, Field(ge=1, le=100)]
 _Share = Annotated[float, Field(gt=0.0, le=10.0)]
 _Weight = Annotated[float, Field(gt=0.0, le=1e6)]
 _Tolerance = Annotated[float, Field(ge=1e-6, le=1.0)]
-_Observations = Annotated[tuple[Literal["q"], ...], Field(min_length=1, max_length=1)]
+_Observations = Annotated[tuple[Observation, ...], Field(min_length=1, max_length=5)]
 
 
 class JoystickModel(Model):
@@ -52,11 +54,11 @@ class PriorModel(Model):
 
     displacement: _Share = Field(
         default=_PRIOR.displacement,
-        description="The expected size of a displacement [share of range].",
+        description="The usual displacement of an actuator [share of its range].",
     )
     spread: _Share = Field(
         default=_PRIOR.spread,
-        description="The standard deviation of a displacement about its model [share of range].",
+        description="The standard deviation of a displacement about its model [share of its size].",
     )
     weight: _Weight = Field(
         default=_PRIOR.weight,
@@ -65,33 +67,47 @@ class PriorModel(Model):
     slope_weight: _Weight = Field(
         default=_PRIOR.slope_weight,
         description="The number of observations the belief is worth that displacement does not "
-        "depend on position.",
+        "depend on position (affine and quadratic basis).",
     )
 
 
 class RampeModel(Model):
     """The estimator of the operator's next displacement."""
 
-    n_init: Annotated[int, Field(ge=1, le=1000)] = Field(
+    n_init: Annotated[int, Field(ge=0, le=1000)] = Field(
         default=_RAMPE.n_init,
-        description="The occurrences of a category before its first forecast.",
+        description="The own occurrences of a category before its first forecast; with 0, "
+        "categories never seen borrow from related ones.",
     )
-    basis: Literal["affine"] = Field(
-        default="affine", description="The regressor: affine, that is the observations and 1."
+    basis: Basis | tuple[Basis, ...] = Field(
+        default=_RAMPE.basis,
+        description="What displacement depends on, for all actuators or a list with one for each: "
+        "affine and quadratic functions of the start, or radial, a Gaussian process.",
     )
     forgetting: Annotated[float, Field(ge=0.5, le=1.0)] = Field(
         default=_RAMPE.forgetting,
         description="The forgetting factor per occurrence, 1 for none [-].",
     )
-    tol: Annotated[float, Field(gt=0.0, lt=1.0)] = Field(
-        default=_RAMPE.tol,
-        description="The relative size below which a singular value counts as 0 [-].",
+    memory: Annotated[int, Field(ge=4, le=256)] = Field(
+        default=_RAMPE.memory,
+        description="The number of newest occurrences that a category remembers.",
+    )
+    borrow: Annotated[float, Field(ge=0.0, lt=1.0)] = Field(
+        default=_RAMPE.borrow,
+        description="The correlation of categories that differ in one actuator, 0 for none [-].",
+    )
+    two_futures_from: Annotated[int, Field(ge=8, le=1_000_000)] = Field(
+        default=_RAMPE.two_futures_from,
+        description="The remembered occurrences from which two futures of one start are told.",
     )
     prior: PriorModel = Field(
         default=PriorModel(), description="The belief before a category was ever seen."
     )
     observations: _Observations = Field(
-        default=("q",), description="The quantities the regressor sees: q, the actuator positions."
+        default=_RAMPE.observations,
+        description="What the estimator sees at the start of a primitive: q, the positions; time "
+        "since the start; command_sum, the integral of the command since the last primitive; "
+        "command; speed.",
     )
 
 

@@ -15,7 +15,7 @@ from rampe_guard.wire.inputs import (
     decode_actuators,
     decode_joystick,
 )
-from rampe_guard.wire.prediction import Prediction, PredictionSweep
+from rampe_guard.wire.prediction import Endpoint, Prediction, PredictionSweep
 from rampe_guard.wire.schema import json_schemas
 from rampe_guard.wire.state import State
 from rampe_guard.wire.sweep import SweepReply, SweepRequest, decode_sweep_request
@@ -27,6 +27,7 @@ __all__ = [
     "Ack",
     "ActuatorsMessage",
     "Alert",
+    "Endpoint",
     "Heartbeat",
     "InputAges",
     "InputRates",

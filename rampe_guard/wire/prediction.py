@@ -27,6 +27,13 @@ class PredictionSweep(Message, frozen=True, kw_only=True):
     time_to_collision_s: f.TimeToCollision
 
 
+class Endpoint(Message, frozen=True, kw_only=True):
+    """One of two futures."""
+
+    position: Annotated[f.ByActuator, Meta(description="End position by actuator [rad or m].")]
+    share: f.Probability
+
+
 class Prediction(Message, frozen=True, kw_only=True):
     """The primitive under way: what is expected of it, and what came of it."""
 
@@ -55,8 +62,16 @@ class Prediction(Message, frozen=True, kw_only=True):
     ]
     start: Annotated[f.ByActuator, Meta(description="Position where it started [rad or m].")]
     endpoint: Annotated[
-        f.ByActuator | None, Meta(description="Expected end position by actuator [rad or m].")
+        f.ByActuator | None, Meta(description="Likeliest end position by actuator [rad or m].")
     ]
+    endpoints: Annotated[
+        tuple[Endpoint, ...],
+        Meta(description="Both ends where two futures were seen from such a start; else empty."),
+    ] = ()
+    borrowed_from: Annotated[
+        tuple[f.Category, ...],
+        Meta(description="Related categories that the forecast borrows from."),
+    ] = ()
     progress: Annotated[
         f.ByActuator, Meta(description="Displacement so far by actuator [rad or m].")
     ]
@@ -67,6 +82,9 @@ class Prediction(Message, frozen=True, kw_only=True):
     learned: Annotated[
         bool | None, Meta(description="Whether it was learned from; null until ended.")
     ]
+    not_learned: Annotated[
+        str | None, Meta(description="A word for why it was not learned; null if it was.")
+    ] = None
     any_path: f.AnyPath
     sweeps: Annotated[
         tuple[PredictionSweep, ...], Meta(description="Results by forecast and zone.")

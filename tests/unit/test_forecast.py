@@ -5,9 +5,9 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from rampe_guard.core.config import ActuatorConfig
+from rampe_guard.core.displacement import DisplacementForecast
 from rampe_guard.core.forecast import Forecaster, IntentForecast
 from rampe_guard.core.primitive import Primitive
-from rampe_guard.core.rampe import DisplacementForecast
 from rampe_guard.core.types import FloatArray
 
 ACTUATORS = (
@@ -25,7 +25,7 @@ def forecaster(tail: float = 0.15) -> Forecaster:
 
 def intent(q: FloatArray, tail: float = 0.15, sign: tuple[int, int] = (1, 0)) -> IntentForecast:
     belief = DisplacementForecast(
-        np.array([0.8, 0.0]) * sign, np.array([0.1, 0.01]), np.array([7.0, 7.0]), 5
+        sign, np.array([0.8, 0.0]) * sign, np.array([0.1, 0.01]), np.array([7.0, 7.0]), 5
     )
     command = np.array([0.5, 0.0]) * sign
     return forecaster(tail).intent(q, NONE, command, Primitive(sign, Q, 0.0), belief)

@@ -3,6 +3,7 @@ import pytest
 
 from rampe_guard.core.alarm import Level
 from rampe_guard.core.config import AlertConfig
+from rampe_guard.core.displacement import DisplacementForecast
 from rampe_guard.core.events import Evidence
 from rampe_guard.core.forecast import IntentForecast, StoppingForecast
 from rampe_guard.core.levels import LevelRules, worst
@@ -13,16 +14,10 @@ STOPPING = StoppingForecast(np.array([1.0]), np.array([1.0]), np.array([0.5]), n
 
 
 def intent(duration: float, mean: float = 1.0) -> IntentForecast:
-    return IntentForecast(
-        np.array([2.0]),
-        np.array([1.0]),
-        np.array([0.0]),
-        np.array([mean]),
-        np.array([0.2]),
-        np.array([9.0]),
-        duration,
-        7,
+    belief = DisplacementForecast(
+        (1,), np.array([mean]), scale=np.array([0.2]), dof=np.array([9.0]), occurrences=7
     )
+    return IntentForecast(np.array([2.0]), np.array([0.0]), belief, None, duration)
 
 
 def zone(

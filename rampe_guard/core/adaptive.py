@@ -1,0 +1,344 @@
+"""The default mode: the best forecast of the next displacement that the evidence allows.
+
+Per category Ω, each step on its own and each learned online::
+
+    experience   newest occurrences (start y, displacement along Ω), weighted λ^age
+        │
+        ├── radial / ridge      x̂ and variance v from this category alone, from a prior
+        │        └── borrow     the same from categories that differ in one actuator
+        │                                  │
+    scales  (usual displacement) ──► mean, never against Ω, nor past a limit
+    spread  (errors made)        ──► scale, degrees of freedom, covariance, shape
+    modes   (two futures?)       ──► both ends
+    passing (what became of it)  ──► within the primitive: lever and speed
+
+Borrowing: neighbours in Ω are taken to be correlated by c. What a neighbour knows, f and v
+against its prior variance k₀, is to this category a witness with mean c f and variance
+k₀ - c²(k₀ - v); witnesses add up by precision, the prior counted once (a Bayesian committee).
+
+Changes of habit: λ lets old occurrences fade, and a run of errors to one side, or a second
+outlier like the first, makes the older ones count little at once.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import stdtr
+
+from rampe_guard.core.basis import affine, quadratic
+from rampe_guard.core.config import Basis, RampeConfig
+from rampe_guard.core.displacement import DisplacementForecast
+from rampe_guard.core.experience import Experience
+from rampe_guard.core.modes import TwoFutures, two_futures
+from rampe_guard.core.passing import Moment, PassingModel, UnderWay
+from rampe_guard.core.radial import RadialFit, RadialKernel
+from rampe_guard.core.ridge import Ridge
+from rampe_guard.core.scales import Scales
+from rampe_guard.core.screening import MOST_TAPS, Refusal, is_still, screen
+from rampe_guard.core.spread import BINS, Spread
+from rampe_guard.core.types import Category, FloatArray, Indices
+
+_BASES: tuple[Basis, ...] = ("affine", "quadratic", "radial")
+_WITNESSES = 8
+"""Most neighbours that are heard: the most experienced ones."""
+_OUTLIER = 1e-6
+"""A displacement less likely than this, by all that is known, is set aside."""
+_ALIKE = 0.25
+"""Two outliers that differ less than this share of the usual displacement are a habit."""
+_DRIFT_MEMORY = 0.8
+_DRIFT_LIMIT = 6.0
+"""Sum of standardised errors, fading, that chance does not reach (3.6 standard deviations)."""
+_QUESTIONS = (0.25, 0.5, 1.0, 2.0)
+"""Ways ahead of which it is learned whether they were passed [usual displacements]."""
+_MODE_DOF = 4.0
+_LEAST_SCATTER = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class _Estimate:
+    """x̂ of one category's active actuators (m,), its variance in units of the noise (m,)."""
+
+    mean: FloatArray
+    variance: FloatArray
+    usual: FloatArray
+    related: tuple[Category, ...]
+
+
+class Adaptive:
+    """Bounded, online, per category; see the module.
+
+    Args:
+        actuators: n.
+        limits: (n, 2) [unit], infinite where there are none.
+        config: the estimator's settings.
+        observations: length of ξ.
+    """
+
+    def __init__(
+        self, actuators: int, limits: FloatArray, config: RampeConfig, observations: int = 0
+    ) -> None:
+        self.n = actuators
+        self.width = actuators + observations
+        self._limits = limits
+        self._config = config
+        basis = config.basis
+        self._bases = (basis,) * actuators if isinstance(basis, str) else tuple(basis)
+        prior = config.prior
+        self._kernel = RadialKernel(1.0 / prior.weight)
+        self.scales = Scales(limits, prior.displacement, observations)
+        self.spread = Spread(actuators, prior.spread)
+        self.passing = PassingModel(actuators)
+        self.experiences: dict[Category, Experience] = {}
+        self.refused: Counter[str] = Counter()
+        self._fits: dict[Category, RadialFit] = {}
+        self._taps: list[tuple[Category, FloatArray, FloatArray]] = []
+        self._still = 0
+
+    @property
+    def basis_codes(self) -> tuple[int, ...]:
+        """The basis of each actuator, as a number."""
+        return tuple(_BASES.index(basis) for basis in self._bases)
+
+    def empty(self) -> Adaptive:
+        """The same estimator before its first lesson."""
+        return Adaptive(self.n, self._limits, self._config, self.width - self.n)
+
+    def predict(self, category: Category, y: FloatArray) -> DisplacementForecast | None:
+        """Blocks 16 and 19: forecast at the start y (n + len(ξ),); None if nothing is known."""
+        active = np.flatnonzero(category)
+        own = self.experiences.get(category)
+        occurrences = 0 if own is None else own.occurrences
+        if occurrences < self._config.n_init or not np.isfinite(y).all():
+            return None
+        if own is None and not self.scales.moved[active].all():
+            return None  # an actuator that has never moved: nothing to borrow
+        estimate = self._estimate(category, active, own, y)
+        return self._forecast(category, active, own, y, estimate)
+
+    def observe(self, category: Category, y: FloatArray, x: FloatArray) -> Refusal | None:
+        """Blocks 5 to 15, 17, 18: learn that a primitive from y went x (n,), or say why not."""
+        refusal = screen(category, y[: self.n], x, self._limits, self.scales)
+        if refusal is None and not np.isfinite(y).all():
+            refusal = "not_finite"
+        if refusal is None and is_still(x, self.scales):
+            return self._still_primitive(category, y, x)
+        if refusal is None:
+            for tap in self._taps:
+                self._learn(*tap)
+            self._taps, self._still = [], 0
+            refusal = self._learn(category, y, x)
+        if refusal is not None:
+            self.refused[refusal] += 1
+        return refusal
+
+    def learn_passing(
+        self, forecast: DisplacementForecast, moments: Sequence[Moment], x: FloatArray
+    ) -> None:
+        """Learn what lever and speed said, at ``moments``, about a primitive that went x (n,)."""
+        active = np.flatnonzero(forecast.category)
+        usual = self.scales.usual
+        if not moments or not np.isfinite(usual[active]).all() or not np.isfinite(x).all():
+            return
+        along = np.array(forecast.category, dtype=np.float64) * x
+        asked: list[FloatArray] = []
+        for moment in moments:
+            lever = moment.under_way
+            for share in _QUESTIONS:
+                distance = moment.progress + share * usual
+                ratio = forecast.passing(distance, moment.progress)
+                passed = (along >= distance).astype(np.float64)
+                rows = (ratio, lever.command, lever.peak, lever.speed, np.arange(self.n), passed)
+                asked.append(np.stack([row[active] for row in rows]))
+        ratio, command, peak, speed, actuator, passed = np.concatenate(asked, axis=1)
+        self.passing.learn(ratio, UnderWay(command, peak, speed), actuator, passed)
+
+    def _still_primitive(self, category: Category, y: FloatArray, x: FloatArray) -> Refusal | None:
+        self._still += 1
+        if self._still <= MOST_TAPS:
+            self._taps.append((category, y, x))
+            return None
+        self.refused["no_motion"] += 1 + len(self._taps)
+        self._taps = []
+        return "no_motion"
+
+    def _learn(self, category: Category, y: FloatArray, x: FloatArray) -> Refusal | None:
+        known = self.experiences.get(category)
+        own = known or self.begin(category)
+        move = np.array(category, dtype=np.float64)[own.active] * x[own.active]
+        estimate = self._estimate(category, own.active, known, y)
+        if np.isfinite(estimate.usual).all():
+            refusal = self._take_error(own, move, estimate)
+            if refusal is not None:
+                self.experiences[category] = own
+                return refusal
+        own.add(y, move, self._config.memory, self._config.forgetting)
+        self.scales.learn(y, x, own.active, move)
+        self.experiences[category] = own
+        return None
+
+    def _take_error(self, own: Experience, move: FloatArray, estimate: _Estimate) -> Refusal | None:
+        """Learn from how wrong the forecast was; refuse a first outlier."""
+        unit = self.spread.unit(estimate.mean, estimate.variance, estimate.usual)
+        z = (move - estimate.mean) / unit
+        standard, dof = self.spread.standard(own, own.active)
+        passed = np.asarray(stdtr(dof, z / standard), dtype=np.float64)
+        if 2.0 * np.minimum(passed, 1.0 - passed).min() < _OUTLIER / len(z):
+            before, own.suspect = own.suspect, move
+            alike = before is not None and bool(
+                (np.abs(move - before) <= _ALIKE * np.maximum(estimate.usual, before)).all()
+            )
+            if not alike:
+                return "outlier"
+            own.distrust()
+            own.suspect = None
+            return None  # a new habit; its distance from the old one is no spread
+        own.suspect = None
+        self.spread.learn(own, z, passed, estimate.mean, estimate.usual, self._config.forgetting)
+        own.drift = _DRIFT_MEMORY * own.drift + z / standard
+        if np.abs(own.drift).max() > _DRIFT_LIMIT:
+            own.distrust()
+        return None
+
+    def begin(self, category: Category) -> Experience:
+        """An empty memory for a category."""
+        own = Experience.of(category, self.width)
+        prior = self._config.prior
+        scale = np.where(np.isfinite(self.scales.width), self.scales.width, 1.0)
+        seen = np.isfinite(self.scales.low)
+        middle = np.where(
+            seen, (np.where(seen, self.scales.low, 0) + np.where(seen, self.scales.high, 0)) / 2, 0
+        )
+        for name, basis in (("affine", affine(self.width)), ("quadratic", quadratic(self.width))):
+            columns = np.flatnonzero([self._bases[j] == name for j in own.active])
+            if len(columns):
+                weights = (prior.weight, prior.slope_weight)
+                own.ridges.append(Ridge.begin(basis, columns, middle, scale, weights))
+        return own
+
+    def _estimate(
+        self, category: Category, active: Indices, own: Experience | None, y: FloatArray
+    ) -> _Estimate:
+        usual = self.scales.usual[active]
+        k0 = self._kernel.variance
+        weighed = np.zeros(len(active))
+        precision: FloatArray = np.full(len(active), 1.0 / k0)
+        if own is not None and own.occurrences:
+            f, v, k = self._alone(own, y)
+            weighed += f / v
+            precision += 1.0 / v - 1.0 / k
+        related = []
+        rho = self._config.borrow
+        for other in self._neighbours(category) if rho > 0.0 else ():
+            f, v, k = self._alone(other, y)
+            v = k - rho * rho * (k - v)
+            here, there = _shared(category, active, other)
+            weighed[here] += rho * f[there] / v[there]
+            precision[here] += 1.0 / v[there] - 1.0 / k[there]
+            related.append(other.category)
+        mean = np.maximum(usual + weighed / precision, 0.0)
+        return _Estimate(mean, 1.0 / precision, usual, tuple(related))
+
+    def _alone(self, own: Experience, y: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Deviation from usual, variance and prior variance (m,) by this category alone."""
+        usual = self.scales.usual[own.active]
+        m = len(usual)
+        f, v, k = np.zeros(m), np.full(m, self._kernel.variance), np.full(m, self._kernel.variance)
+        radial = [i for i, j in enumerate(own.active) if self._bases[j] == "radial"]
+        if radial:
+            fit = self._fit(own)
+            deviation, variance = self._kernel.predict(fit, y / self.scales.width, usual)
+            f[radial], v[radial] = deviation[radial], variance
+        for ridge in own.ridges:
+            at = ridge.columns
+            f[at], v[at], k[at] = ridge.predict(y, usual[at])
+        return f, v, k
+
+    def _fit(self, own: Experience) -> RadialFit:
+        version = (own.version, self.scales.version)
+        fit = self._fits.get(own.category)
+        if fit is None or fit.version != version:
+            fit = self._kernel.fit(own, self.scales.width, version)
+            self._fits[own.category] = fit
+        return fit
+
+    def _neighbours(self, category: Category) -> list[Experience]:
+        """The most experienced categories that differ in one actuator."""
+        found = []
+        for j, sign in enumerate(category):
+            for other in (-1, 0, 1):
+                if other != sign:
+                    known = self.experiences.get((*category[:j], other, *category[j + 1 :]))
+                    if known is not None and known.occurrences:
+                        found.append(known)
+        found.sort(key=lambda e: -e.occurrences)
+        return found[:_WITNESSES]
+
+    def _forecast(
+        self,
+        category: Category,
+        active: Indices,
+        own: Experience | None,
+        y: FloatArray,
+        estimate: _Estimate,
+    ) -> DisplacementForecast | None:
+        n, q = self.n, y[: self.n]
+        sign = np.array(category, dtype=np.float64)
+        room = np.where(sign > 0, self._limits[:, 1] - q, q - self._limits[:, 0])
+        room = np.where(sign != 0.0, np.maximum(room, 0.0), 0.0)
+        standard, dof = self.spread.standard(own, active)
+        unit = self.spread.unit(estimate.mean, estimate.variance, estimate.usual)
+        mean, scale = np.zeros(n), np.zeros(n)
+        mean[active] = np.minimum(estimate.mean, room[active])
+        scale[active] = standard * unit
+        shape = np.tile(np.linspace(0.0, 1.0, BINS + 1), (n, 1))
+        shape[active] = self.spread.shapes(active, estimate.mean, estimate.usual)
+        degrees = np.full(n, dof)
+        modes, weights = None, np.ones(1)
+        futures = self._futures(own, y, estimate.usual)
+        if futures is not None:
+            modes = np.zeros((2, n))
+            modes[:, active] = np.clip(futures.ends, 0.0, room[active])
+            weights = futures.shares
+            scale[active] = np.maximum(futures.scatter, _LEAST_SCATTER * estimate.usual)
+            degrees = np.full(n, _MODE_DOF)
+            modes = sign * modes
+        signed = sign[active] * scale[active] * np.sqrt(degrees[active] / (degrees[active] - 2.0))
+        covariance = np.zeros((n, n))
+        covariance[np.ix_(active, active)] = np.outer(signed, signed) * self.spread.correlation(
+            own, len(active)
+        )
+        return DisplacementForecast(
+            category=category,
+            mean=sign * mean,
+            scale=scale,
+            dof=degrees,
+            occurrences=0 if own is None else own.occurrences,
+            related=estimate.related,
+            covariance=covariance,
+            shape=shape,
+            modes=modes,
+            mode_weights=weights,
+            room=room,
+            weights=self.passing.weights,
+        )
+
+    def _futures(
+        self, own: Experience | None, y: FloatArray, usual: FloatArray
+    ) -> TwoFutures | None:
+        if own is None or len(own.trust) < self._config.two_futures_from:
+            return None
+        fit = self._fit(own)
+        near = self._kernel.closeness(fit, y / self.scales.width)
+        return two_futures(own.moves, near * np.minimum(own.trust * 2.0, 1.0), usual)
+
+
+def _shared(category: Category, active: Indices, other: Experience) -> tuple[Indices, Indices]:
+    """Positions of the actuators that both categories move alike, in each one's own order."""
+    signs = np.array(other.category)
+    alike = signs[active] == np.array(category)[active]
+    here = np.flatnonzero(alike)
+    return here, np.searchsorted(other.active, active[here])

@@ -1,0 +1,185 @@
+"""What the default mode has learned, as plain arrays, and back.
+
+Categories differ in how many actuators they move and how often they were seen, so their
+arrays are laid end to end, and cut again by the sizes that stand beside them.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from rampe_guard.core.experience import Experience
+from rampe_guard.core.screening import Refusal
+from rampe_guard.core.types import FloatArray
+
+if TYPE_CHECKING:
+    from rampe_guard.core.adaptive import Adaptive
+
+Arrays = Mapping[str, npt.NDArray[np.generic]]
+_VERSION = 1
+_REASONS: tuple[str, ...] = get_args(Refusal)
+
+
+def snapshot(model: Adaptive) -> dict[str, npt.NDArray[np.generic]]:
+    """All that ``model`` has learned; primitives without motion that wait are left out."""
+    own = list(model.experiences.values())
+    ridges = [r for e in own for r in e.ridges]
+    scales, spread, passing = model.scales, model.spread, model.passing
+    return {
+        **_settings(model),
+        "categories": np.array([e.category for e in own], dtype=np.int8).reshape(-1, model.n),
+        "occurrences": np.array([e.occurrences for e in own], dtype=np.int64),
+        "remembered": np.array([len(e.trust) for e in own], dtype=np.int64),
+        "evidence": np.array([e.evidence for e in own], dtype=np.float64),
+        "starts": _flat([e.starts for e in own]),
+        "moves": _flat([e.moves for e in own]),
+        "trust": _flat([e.trust for e in own]),
+        "surprise": _flat([e.surprise for e in own]),
+        "drift": _flat([e.drift for e in own]),
+        "suspected": np.array([e.suspect is not None for e in own], dtype=np.bool_),
+        "suspects": _flat([e.suspect for e in own if e.suspect is not None]),
+        "ridge_scales": _flat([a for r in ridges for a in (r.center, r.width)]),
+        "ridge_sums": _flat([a for r in ridges for a in (r.precision, r.moment)]),
+        "scale_low": scales.low,
+        "scale_high": scales.high,
+        "scale_width": scales.width,
+        "scale_moved": scales.moved,
+        "scale_count": scales.count,
+        "scale_total": scales.total,
+        "scale_largest": scales.largest,
+        "spread_errors": spread.errors,
+        "spread_squares": spread.squares,
+        "spread_shape": spread.shape,
+        "passing_mean": passing.mean,
+        "passing_precision": passing.precision,
+        "refused": np.array([model.refused[reason] for reason in _REASONS], dtype=np.int64),
+    }
+
+
+def restore(model: Adaptive, arrays: Arrays) -> Adaptive:
+    """A model like ``model`` that goes on where the snapshot was taken.
+
+    Raises:
+        ValueError: it is of another estimator, or damaged.
+    """
+    for name, mine in _settings(model).items():
+        theirs = _entry(arrays, name)
+        if not np.array_equal(theirs, mine):
+            raise ValueError(f"{name} is {theirs.tolist()}, this estimator has {mine.tolist()}")
+    fresh = model.empty()
+    scales, spread, passing = fresh.scales, fresh.spread, fresh.passing
+    for name in ("low", "high", "width", "moved", "count", "total", "largest"):
+        mine = getattr(scales, name)
+        setattr(scales, name, _like(arrays, f"scale_{name}", mine))
+    scales.refresh()
+    for name in ("errors", "squares", "shape"):
+        setattr(spread, name, _finite(arrays, f"spread_{name}", getattr(spread, name)))
+    for name in ("mean", "precision"):
+        setattr(passing, name, _finite(arrays, f"passing_{name}", getattr(passing, name)))
+    counts = _like(arrays, "refused", np.zeros(len(_REASONS)))
+    fresh.refused = Counter({r: int(c) for r, c in zip(_REASONS, counts, strict=True) if c})
+    for own in _experiences(fresh, arrays):
+        fresh.experiences[own.category] = own
+    return fresh
+
+
+def _experiences(model: Adaptive, arrays: Arrays) -> list[Experience]:
+    categories = _entry(arrays, "categories").astype(np.int64)
+    total = len(categories)
+    if categories.shape != (total, model.n) or (np.abs(categories) > 1).any():
+        raise ValueError(f"categories of shape {categories.shape}, need signs ({total}, {model.n})")
+    per = {
+        name: _finite(arrays, name, np.zeros(total))
+        for name in ("occurrences", "remembered", "evidence", "suspected")
+    }
+    if (per["remembered"] < 0).any() or (per["occurrences"] < per["remembered"]).any():
+        raise ValueError("a category remembers more primitives than it has seen")
+    names = ("starts", "moves", "trust", "surprise", "drift", "suspects")
+    rolls = {name: _Roll(name, arrays) for name in (*names, "ridge_scales", "ridge_sums")}
+    result = []
+    for i, signs in enumerate(categories):
+        own = model.begin(tuple(int(s) for s in signs))
+        k, m = int(per["remembered"][i]), len(own.active)
+        if m == 0:
+            raise ValueError("a category moves no actuator")
+        own.starts = rolls["starts"].take(k, model.width)
+        own.moves = rolls["moves"].take(k, m)
+        own.trust = rolls["trust"].take(k)
+        own.surprise = rolls["surprise"].take(m, m)
+        own.drift = rolls["drift"].take(m)
+        own.suspect = rolls["suspects"].take(m) if per["suspected"][i] else None
+        own.occurrences = int(per["occurrences"][i])
+        own.evidence = float(per["evidence"][i])
+        for ridge in own.ridges:
+            ridge.center = rolls["ridge_scales"].take(*ridge.center.shape)
+            ridge.width = rolls["ridge_scales"].take(*ridge.width.shape)
+            ridge.precision = rolls["ridge_sums"].take(*ridge.precision.shape)
+            ridge.moment = rolls["ridge_sums"].take(*ridge.moment.shape)
+        if (own.trust <= 0.0).any():
+            raise ValueError("trust must be above 0")
+        result.append(own)
+    for roll in rolls.values():
+        roll.end()
+    return result
+
+
+class _Roll:
+    """An array of arrays laid end to end, cut off piece by piece."""
+
+    def __init__(self, name: str, arrays: Arrays) -> None:
+        self._name = name
+        self._values = _entry(arrays, name).astype(np.float64)
+        self._at = 0
+        if self._values.ndim != 1 or not np.isfinite(self._values).all():
+            raise ValueError(f"{name} has shape {self._values.shape}, or is not finite")
+
+    def take(self, *shape: int) -> FloatArray:
+        size = int(np.prod(shape))
+        piece = self._values[self._at : self._at + size]
+        if len(piece) != size:
+            raise ValueError(f"{self._name} ends after {len(self._values)} values")
+        self._at += size
+        return piece.reshape(shape).copy()
+
+    def end(self) -> None:
+        if self._at != len(self._values):
+            raise ValueError(f"{self._name} has {len(self._values)} values, {self._at} belong")
+
+
+def _settings(model: Adaptive) -> dict[str, npt.NDArray[np.generic]]:
+    """What must be the same for a snapshot to fit."""
+    return {
+        "version": np.array(_VERSION),
+        "actuators": np.array(model.n),
+        "observed": np.array(model.width),
+        "basis": np.array(model.basis_codes, dtype=np.int8),
+    }
+
+
+def _flat(arrays: list[FloatArray]) -> FloatArray:
+    return np.concatenate([np.zeros(0), *(a.ravel() for a in arrays)])
+
+
+def _entry(arrays: Arrays, name: str) -> npt.NDArray[np.generic]:
+    if name not in arrays:
+        raise ValueError(f"{name} is missing")
+    return np.asarray(arrays[name])
+
+
+def _like(arrays: Arrays, name: str, mine: FloatArray) -> FloatArray:
+    values = _entry(arrays, name).astype(np.float64)
+    if values.shape != mine.shape or np.isnan(values).any():
+        raise ValueError(f"{name} has shape {values.shape}, need {mine.shape} without NaN")
+    return values
+
+
+def _finite(arrays: Arrays, name: str, mine: FloatArray) -> FloatArray:
+    values = _like(arrays, name, mine)
+    if not np.isfinite(values).all():
+        raise ValueError(f"{name} is not finite")
+    return values

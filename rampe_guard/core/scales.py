@@ -1,0 +1,98 @@
+"""Units of experience: how far this operator works and how far he usually goes.
+
+Angles and strokes, a slew of three turns and a cylinder used over a third of its stroke: the
+estimator compares them in units that it learns. Starts are compared in shares of the range
+worked in, displacements in shares of the actuator's usual displacement.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rampe_guard.core.types import FloatArray, Indices
+
+_LEAST_SHARE = 0.25
+"""A range worked in counts at least this share of the limits: early on, little was seen."""
+_OBSERVATION_WIDTH = 1.7
+"""Ranges of an observation ξ beside q that count as one range of q: ξ says less than q."""
+_STALE = 0.05
+"""Relative growth of a width after which everything is scaled anew."""
+_PRIOR_COUNT = 2.0
+"""Displacements that the prior's usual displacement is worth."""
+
+
+class Scales:
+    """Learned units of n actuators and of the observations ξ beside them.
+
+    Args:
+        limits: (n, 2) [unit], infinite where there are none.
+        displacement: usual displacement before any was seen [share of the range].
+        observations: length of ξ.
+
+    Attributes:
+        width: unit of each entry of y (n + len(ξ),); infinite while it has not varied.
+        usual: usual displacement (n,) [unit]; nan while unknown.
+        version: grows when ``width`` changes.
+    """
+
+    def __init__(self, limits: FloatArray, displacement: float, observations: int = 0) -> None:
+        n = len(limits)
+        span = limits[:, 1] - limits[:, 0]
+        known = np.isfinite(span)
+        self.span: FloatArray = np.where(known, span, np.nan)
+        self._extra = np.concatenate((np.ones(n), np.full(observations, _OBSERVATION_WIDTH)))
+        self._least = np.concatenate(
+            (np.where(known, _LEAST_SHARE * span, 0.0), np.zeros(observations))
+        )
+        self._most = np.concatenate((np.where(known, span, np.inf), np.full(observations, np.inf)))
+        self.low: FloatArray = np.full(n + observations, np.inf)
+        self.high: FloatArray = np.full(n + observations, -np.inf)
+        self.moved: FloatArray = np.zeros(n + observations)
+        self.moved[n:] = 1.0
+        self.count: FloatArray = np.where(known, _PRIOR_COUNT, 0.0)
+        self.total: FloatArray = np.where(known, _PRIOR_COUNT * displacement * span, 0.0)
+        self.largest: FloatArray = np.zeros(n)
+        self.version = 0
+        self.width: FloatArray = np.where(self._least > 0.0, self._least, np.inf)
+        self._measure_usual()
+
+    def learn(
+        self,
+        y: FloatArray,
+        x: FloatArray,
+        active: Indices,
+        move: FloatArray,
+    ) -> None:
+        """Take a primitive from y (n + len(ξ),) that went x (n,), by ``move`` along Ω (m,)."""
+        n = len(x)
+        self.moved[active] = 1.0
+        end = y.copy()
+        end[:n] += x
+        self.low = np.minimum(self.low, np.minimum(y, end))
+        self.high = np.maximum(self.high, np.maximum(y, end))
+        size = np.abs(move)
+        self.total[active] += size
+        self.count[active] += 1.0
+        self.largest[active] = np.maximum(self.largest[active], size)
+        self._measure_usual()
+        self.measure()
+
+    def refresh(self) -> None:
+        """Take up what was restored."""
+        self.version += 1
+        self._measure_usual()
+
+    def measure(self) -> None:
+        """Adopt the widths that were seen, if they differ enough from those in force."""
+        reach = np.clip(self.high - self.low, self._least, self._most)
+        # what the operator has not moved yet, or what never varied, tells starts not apart
+        width = np.where((self.moved > 0.0) & (reach > 0.0), reach * self._extra, np.inf)
+        same = np.isclose(width, self.width, rtol=_STALE)
+        if not same.all():
+            self.width = width
+            self.version += 1
+
+    def _measure_usual(self) -> None:
+        known = (self.count > 0.0) & (self.total > 0.0)
+        self.usual: FloatArray = np.full(len(self.count), np.nan)
+        self.usual[known] = self.total[known] / self.count[known]

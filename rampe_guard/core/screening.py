@@ -1,0 +1,91 @@
+"""What must not be learned: refusal of primitives that cannot be what they seem.
+
+==================  ==================================================================
+``not_finite``      a start or displacement is NaN or infinite
+``outside_limits``  it began or ended beyond the joint's limits
+``against_lever``   an actuator went far against its own lever
+``wrong_actuator``  the actuators that were not commanded moved, those commanded did not
+``no_motion``       several primitives in a row without any motion: a frozen sensor
+``impossible``      many times farther than this actuator ever went (without limits)
+``outlier``         so far from experience that it is set aside; a second one like it is
+                    a change of habit, and is learned
+==================  ==================================================================
+
+A single primitive without motion is a tap on the lever, and as real as any. It is held back
+until something moves again.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from rampe_guard.core.scales import Scales
+from rampe_guard.core.types import Category, FloatArray
+
+Refusal: TypeAlias = Literal[
+    "not_finite",
+    "outside_limits",
+    "against_lever",
+    "wrong_actuator",
+    "no_motion",
+    "impossible",
+    "outlier",
+]
+MOST_TAPS = 2
+"""Primitives without motion in a row that may be taps; more is a frozen sensor."""
+_SLACK = 0.05
+"""How far beyond its limits an actuator may be measured [share of the range]."""
+_AGAINST = 0.1
+"""Motion against the lever that lag and load explain [share of the range]."""
+_IMPOSSIBLE = 20.0
+_STILL = 1e-9
+_SETTLED_COUNT = 5.0
+"""Displacements after which the range worked in is known, where there are no limits."""
+
+
+def is_still(x: FloatArray, scales: Scales) -> bool:
+    """True if nothing moved at all in the displacement x (n,)."""
+    span = np.where(np.isfinite(scales.span), scales.span, np.maximum(scales.largest, _STILL))
+    return bool((np.abs(x) <= _STILL * span).all())
+
+
+def screen(
+    category: Category, q: FloatArray, x: FloatArray, limits: FloatArray, scales: Scales
+) -> Refusal | None:
+    """Reason not to learn the primitive from q (n,) that went x (n,), or None.
+
+    Args:
+        category: Ω.
+        q: start [unit].
+        x: displacement [unit].
+        limits: (n, 2) [unit], infinite where there are none.
+        scales: learned units.
+    """
+    if not (np.isfinite(q).all() and np.isfinite(x).all()):
+        return "not_finite"
+    sign = np.array(category, dtype=np.float64)
+    span = _span(scales)
+    ends = np.stack((q, q + x))
+    known = np.isfinite(scales.span)
+    slack = np.where(known, _SLACK * np.nan_to_num(scales.span), 0.0)
+    if ((ends < limits[:, 0] - slack) | (ends > limits[:, 1] + slack)).any():
+        return "outside_limits"
+    share = np.abs(x) / span
+    if (sign * x < 0.0)[share > _AGAINST].any():
+        return "against_lever"
+    driven = sign != 0.0
+    if share[~driven].sum() > max(share[driven].sum(), _AGAINST):
+        return "wrong_actuator"
+    far = np.abs(x) > _IMPOSSIBLE * scales.largest
+    if (far & driven & ~known & (scales.count >= _SETTLED_COUNT)).any():
+        return "impossible"
+    return None
+
+
+def _span(scales: Scales) -> FloatArray:
+    """Range per actuator [unit]: by its limits, else as worked in; infinite while unknown."""
+    worked = (scales.high - scales.low)[: len(scales.span)]
+    settled = (scales.count >= _SETTLED_COUNT) & (worked > 0.0)
+    return np.where(np.isfinite(scales.span), scales.span, np.where(settled, worked, np.inf))
