@@ -104,6 +104,11 @@ class Faithful:
         """Occurrences per category seen."""
         return {category: memory.occurrences for category, memory in self._memory.items()}
 
+    def occurrences(self, category: Category) -> int:
+        """How often one category was seen."""
+        memory = self._memory.get(category)
+        return 0 if memory is None else memory.occurrences
+
     def predict(self, category: Category, y: FloatArray) -> FloatArray | None:
         """Blocks 16 and 19: x̂ (n,) for the observation y (m,); None before ``n_init``."""
         rows = self._rows(y)
@@ -250,9 +255,10 @@ class Faithful:
         self, category: Category, memory: Memory, rows: list[FloatArray], x: FloatArray
     ) -> None:
         if memory.noise is not None:
-            spread = self._spread(self._noise_of(category, memory), memory, rows)
+            before = self._noise_of(category, memory)
+            spread = self._spread(before, memory, rows)
             error = x - self._estimate(category, memory, rows)
-            memory.noise.learn(error, spread, self._forgetting)
+            memory.noise.learn(error, spread, before.noise, self._forgetting)
         system = self._noise_of(category, memory)
         states: list[Shared | Stacked] = []
         for group, w, state in zip(system.groups, system.weights, memory.states, strict=True):

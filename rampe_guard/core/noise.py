@@ -135,9 +135,15 @@ class LearnedNoise:
         n = x.shape[1]
         return LearnedNoise(np.square(_PRIOR_SHARE * size), np.zeros((n, n)), 0.0)
 
-    def learn(self, error: FloatArray, spread: FloatArray, forgetting: float) -> None:
-        """Take the error x - x̂ (n,) of an estimate whose own covariance was HP⁻¹Hᵀ (n, n)."""
-        w = weighting(self.covariance(), coupled=True)
+    def learn(self, error: FloatArray, spread: FloatArray, w: Weighting, forgetting: float) -> None:
+        """Take the error x - x̂ (n,) of an estimate.
+
+        Args:
+            error: [unit].
+            spread: covariance HP⁻¹Hᵀ (n, n) of the estimate itself [unit²].
+            w: the noise so far, taken apart.
+            forgetting: λ.
+        """
         root = np.sqrt(w.values)[:, None] * w.vectors.T / w.deviation  # rootᵀ root = R⁻¹
         a, u = np.linalg.eigh(root @ spread @ root.T)
         whitened = u @ ((u.T @ (root @ error)) / np.sqrt(1.0 + np.maximum(a, 0.0)))

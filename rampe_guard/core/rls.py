@@ -59,7 +59,7 @@ def cholesky_if_uncut(p: FloatArray, tol: float) -> FloatArray | None:
 
 
 def solve(p: FloatArray, b: FloatArray, tol: float) -> FloatArray:
-    """P⁺ b for a symmetric positive semidefinite P (p, p) and b (p,)."""
+    """P⁺ b for a symmetric positive semidefinite P (p, p) and b (p,) or (p, k)."""
     tol = _at_least_rounding(tol, len(p))
     factor = cholesky_if_uncut(p, tol)
     if factor is not None:
@@ -69,7 +69,7 @@ def solve(p: FloatArray, b: FloatArray, tol: float) -> FloatArray:
     s, v = np.linalg.eigh(p)
     kept = s > tol * s[-1]
     v = v[:, kept]
-    least: FloatArray = v @ ((v.T @ b) / s[kept])
+    least: FloatArray = v @ ((v.T @ b).T / s[kept]).T
     return least
 
 
@@ -137,8 +137,12 @@ class Shared:
 
     def spread(self, h: FloatArray, w: Weighting, tol: float) -> FloatArray:
         """Covariance H P⁻¹ Hᵀ (n, n) of the estimate at h (p,)."""
+        tol = _at_least_rounding(tol, len(h))
+        factor = cholesky_if_uncut(self.moment, tol / w.least)
+        if factor is not None:
+            return float(h @ lapack.dpotrs(factor, h)[0]) * w.covariance
         s, v = np.linalg.eigh(self.moment)
-        kept = _uncut(w, s, _at_least_rounding(tol, len(h)))
+        kept = _uncut(w, s, tol)
         along = (v.T @ h) ** 2 / np.where(kept.any(axis=0), s, 1.0)
         root = w.deviation[:, None] * w.vectors
         spread: FloatArray = (root * ((kept @ along) / w.values)) @ root.T
@@ -233,7 +237,8 @@ class Stacked:
         scaled = self._scaled(self.moment, w)
         rows = np.where(self.owner == np.arange(len(w.deviation))[:, None], h, 0.0)
         rows *= w.deviation[:, None]
-        return np.array([rows @ solve(scaled, row, tol) for row in rows])
+        spread: FloatArray = rows @ solve(scaled, rows.T, tol)
+        return spread
 
     def precision(self, w: Weighting) -> FloatArray:
         """P (Σp_j, Σp_j) in the units of equation (4)."""

@@ -39,7 +39,9 @@ def test_nothing_is_estimated_before_n_init(n_init: int) -> None:
         assert (model.parameters(UP) is None) == silent
         model.observe(UP, q, x)
         assert model.categories == {UP: k + 1}
+        assert model.occurrences(UP) == k + 1
     assert model.predict((1, -1), np.zeros(2)) is None
+    assert model.occurrences((1, -1)) == 0
     assert model.categories == {UP: 8}
 
 
