@@ -54,7 +54,7 @@ def _run(args: argparse.Namespace) -> int:
     from rampe_guard.runtime.say import configure
 
     configure()
-    return run(args.site, args.connect, stop)
+    return run(args.site, args.connect, stop, args.operator)
 
 
 def _check(args: argparse.Namespace) -> int:
@@ -112,6 +112,19 @@ def _paper(args: argparse.Namespace) -> int:
     return paper(args.out, args.seeds, args.cycles, args.seed, Console())
 
 
+def _model(args: argparse.Namespace) -> int:
+    from rich.console import Console
+
+    from rampe_guard.programs.modelling import export_model, reset_model, show_model
+
+    if args.action == "export":
+        print(export_model(args.site, args.operator).decode())
+        return 0
+    if args.action == "reset":
+        return reset_model(args.site, args.operator, Console(soft_wrap=True), sure=args.yes)
+    return show_model(args.site, args.operator, Console())
+
+
 def _schema(args: argparse.Namespace) -> int:
     from rampe_guard.settings import scene_schema, site_schema
     from rampe_guard.wire import json_schemas
@@ -147,6 +160,7 @@ def _parser() -> argparse.ArgumentParser:
 
     run = commands.add_parser("run", help="the daemon")
     _site(run, connect=True)
+    _operator(run)
     run.set_defaults(command=_run)
 
     check = commands.add_parser("check", help="validate site, scene, meshes and kinematics")
@@ -183,6 +197,9 @@ def _parser() -> argparse.ArgumentParser:
     paper.add_argument("--seed", type=_positive_int, default=1, help="of the first run (default 1)")
     paper.set_defaults(command=_paper)
 
+    model = commands.add_parser("model", help="what is kept of an operator's way of working")
+    _model_actions(model)
+
     schema = commands.add_parser("schema", help="JSON Schemas of messages and files")
     schema.add_argument("name", nargs="?", help="one of them, such as rampe.alert.v1")
     schema.set_defaults(command=_schema)
@@ -195,6 +212,21 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _model_actions(model: argparse.ArgumentParser) -> None:
+    actions = model.add_subparsers(required=True, metavar="ACTION", dest="action")
+    for action, text in (
+        ("show", "print what was learned"),
+        ("reset", "delete it, for good"),
+        ("export", "print it as JSON"),
+    ):
+        parser = actions.add_parser(action, help=text)
+        _site(parser)
+        _operator(parser)
+        if action == "reset":
+            parser.add_argument("--yes", action="store_true", help="needed on a terminal")
+        parser.set_defaults(command=_model)
+
+
 def _site(parser: argparse.ArgumentParser, *, connect: bool = False) -> None:
     parser.add_argument("site", help="site file (YAML)")
     if connect:
@@ -205,6 +237,11 @@ def _site(parser: argparse.ArgumentParser, *, connect: bool = False) -> None:
             metavar="ENDPOINT",
             help="Zenoh endpoint instead of the site file's, such as tcp/127.0.0.1:7447",
         )
+
+
+def _operator(parser: argparse.ArgumentParser) -> None:
+    text = "who is at the levers, instead of whom the site file names"
+    parser.add_argument("--operator", metavar="NAME", help=text)
 
 
 def _positive(text: str) -> float:

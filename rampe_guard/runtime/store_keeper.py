@@ -62,15 +62,12 @@ class Learner(Protocol):
         """A row a category."""
 
 
-def recall(file: ModelFile, needed: Header, learner: Learner) -> Header | None:
-    """Restore what is in a file; its header, None if there is no file.
+def recall(content: bytes, needed: Header, learner: Learner) -> Header:
+    """Restore what is in a file; returns its header.
 
     Raises:
         ModelFileError: it cannot be used; the learner is as it was.
     """
-    content = file.read()
-    if content is None:
-        return None
     header, arrays = decode(content)
     if reason := misfit(header, needed):
         raise ModelFileError(reason)
@@ -144,7 +141,8 @@ class Keeper:
         except ModelFileError as error:
             self._unkept = str(error)
         try:
-            header = recall(file, self._header, learner)
+            content = file.read()
+            header = None if content is None else recall(content, self._header, learner)
         except ModelFileError as error:
             self._refuse(file, error)
         else:

@@ -24,6 +24,7 @@ from rampe_guard.runtime.intake import Intake
 from rampe_guard.runtime.messages import Scribe
 from rampe_guard.runtime.replay import IDLE_STEP_S
 from rampe_guard.runtime.say import Sayer
+from rampe_guard.runtime.store_keeper import Keeper
 from rampe_guard.runtime.zenoh_io import Bus, Request
 
 _WAKE_S = 0.001
@@ -43,9 +44,10 @@ class Worker:
         machine: site, geometry and sweeper, loaded.
         bus: an open session.
         say: log.
+        keeper: remembers what earlier runs learned, and keeps what this one learns.
     """
 
-    def __init__(self, machine: Machine, bus: Bus, say: Sayer) -> None:
+    def __init__(self, machine: Machine, bus: Bus, say: Sayer, keeper: Keeper) -> None:
         site = machine.site
         base = site.keys.base
         self._bus, self._say = bus, say
@@ -55,6 +57,8 @@ class Worker:
         self._pulse = Pulse(site, boot, start_s, _unix_s, site.scene.content_hash)
         timed = TimedSweeper(machine.sweeper, self._pulse.sweep_ms)
         self._guard = machine.guard(start_s, boot, timed)
+        self._keeper = keeper
+        keeper.begin(self._guard.rampe, start_s)
         self._intake = Intake(bus, site, say)
         self._alerts = bus.outbox(f"{base}/alert", "rampe.alert.v1", urgent=True)
         self._predictions = bus.outbox(f"{base}/prediction", "rampe.prediction.v1")
@@ -83,6 +87,7 @@ class Worker:
                 last_beat_s = now_s
                 self._beat(now_s)
             self._answer(now_s)
+            self._keeper.keep(now_s)
             wait(_WAKE_S)
 
     def _step(self, inputs: Inputs, now_s: float) -> None:
@@ -110,7 +115,7 @@ class Worker:
     def _beat(self, now_s: float) -> None:
         self._pulse.tick += 1
         connected = self._bus.connected
-        extra = []
+        extra = [*self._keeper.reasons()]
         if not connected:
             extra.append(wire.Reason(code="no_router", text="no Zenoh router", key=None))
         health = self._guard.snapshot(now_s).health

@@ -36,6 +36,7 @@ def test_one_cycle_to_its_summary(tmp_path: Path) -> None:
         assert "lead min" in demo.out
         assert "power-line" in demo.out
         assert "1 cycle" in demo.out
+        assert not (tmp_path / "state").exists()  # a simulated operator is not remembered
         assert "Traceback" not in demo.err
 
 

@@ -135,9 +135,9 @@ def router(folder: Path, endpoint: str) -> Process:
     return process
 
 
-def guard(folder: Path, site: Path, endpoint: str) -> Process:
-    """A guard that works when this returns."""
-    args = ["-m", "rampe_guard", "run", str(site), "--connect", endpoint]
+def guard(folder: Path, site: Path, endpoint: str, *more: str) -> Process:
+    """A guard that works when this returns; ``more`` are options of ``run``."""
+    args = ["-m", "rampe_guard", "run", str(site), "--connect", endpoint, *more]
     process = Process(folder, "guard", args)
     try:
         process.wait_for("guarding on")
