@@ -5,7 +5,8 @@ Two questions about the predictive distribution of the site's RAMPE:
 * coverage: how often does the displacement lie in the central 50 % and 90 % interval that was
   given at the start of a primitive?
 * reliability: while a primitive is under way with progress p, what is the chance that it will
-  pass d > p, and how often does it? This is the probability that alerts are made of.
+  pass d > p, by what lever and speed say as well, and how often does it? This is the
+  probability that alerts are made of.
 
 Both are asked about the actuators that the category moves, and only where there is a forecast.
 """
@@ -21,17 +22,13 @@ import numpy.typing as npt
 
 from rampe_guard.core.types import Category, FloatArray
 from rampe_guard.evaluate.forecasters import SiteRampe
-from rampe_guard.evaluate.predictive import Predictive
+from rampe_guard.evaluate.predictive import Predictive, moments
 from rampe_guard.evaluate.segments import Segment
 
 LEVELS = (0.5, 0.9)
 AHEAD = (0.05, 0.1, 0.2, 0.3, 0.5)
 """Distances ahead of the progress that are asked about [share of the range]."""
-SPACING_S = 0.1
-"""Samples of one primitive that are asked lie at least this far apart [s]."""
 BINS = 10
-_SLACK_S = 1e-9
-"""Stamps 0.1 s apart may differ by less in floating point."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +83,9 @@ def coverage(told: Sequence[Foretold], n: int, level: float) -> Coverage:
     for one in told:
         if one.forecast is None:
             continue
-        low, high = (one.forecast.quantile(p) for p in (0.5 - level / 2, 0.5 + level / 2))
+        # quantiles run along Ω: where it is negative, the far end of the interval is the lower
+        near, far = (one.forecast.quantile(p) for p in (0.5 - level / 2, 0.5 + level / 2))
+        low, high = np.minimum(near, far), np.maximum(near, far)
         moved = np.array(one.segment.start.category) != 0
         x = one.segment.displacement
         asked += moved
@@ -116,12 +115,13 @@ class Odds:
         return Odds(self.actuator[chosen], self.said[chosen], self.passed[chosen])
 
 
-def odds(told: Sequence[Foretold], width: FloatArray) -> Odds:
-    """Ask every forecast at every sample about every distance ahead.
+def odds(told: Sequence[Foretold], width: FloatArray, top_speed: FloatArray) -> Odds:
+    """Ask every forecast at every moment about every distance ahead.
 
     Args:
         told: primitives with their forecasts.
         width: range of each actuator (n,) [unit].
+        top_speed: of each actuator (n,) [unit/s].
     """
     rows: list[tuple[int, float, bool]] = []
     for one in told:
@@ -130,27 +130,16 @@ def odds(told: Sequence[Foretold], width: FloatArray) -> Odds:
         sign = np.array(one.segment.start.category, dtype=np.float64)
         moved = np.flatnonzero(sign)
         reached = sign * one.segment.displacement
-        for q in _spaced(one.segment):
-            progress = np.maximum(sign * (q - one.segment.start.q), 0.0)
+        for moment in moments(one.segment, top_speed):
             for ahead in AHEAD:
-                distance = progress + ahead * width
-                said = one.forecast.passing(distance, progress)
+                distance = moment.progress + ahead * width
+                said = one.forecast.passing(distance, moment.progress, moment.under_way)
                 rows += [(int(j), float(said[j]), bool(reached[j] >= distance[j])) for j in moved]
     return Odds(
         actuator=np.array([j for j, _, _ in rows], dtype=np.int64),
         said=np.array([p for _, p, _ in rows], dtype=np.float64),
         passed=np.array([b for _, _, b in rows], dtype=bool),
     )
-
-
-def _spaced(segment: Segment) -> list[FloatArray]:
-    """Positions of a primitive at least `SPACING_S` apart, while it was under way."""
-    chosen, last_s = [], -np.inf
-    for t, q in zip(segment.times_s.tolist(), segment.path, strict=True):
-        if t <= segment.end_s and t - last_s >= SPACING_S - _SLACK_S:
-            chosen.append(q)
-            last_s = t
-    return chosen
 
 
 @dataclass(frozen=True, slots=True)

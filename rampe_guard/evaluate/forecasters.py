@@ -14,7 +14,7 @@ from rampe_guard.core.config import GuardConfig
 from rampe_guard.core.intention import Intention
 from rampe_guard.core.rampe import Rampe
 from rampe_guard.core.types import Category, FloatArray
-from rampe_guard.evaluate.predictive import Predictive, StudentPredictive
+from rampe_guard.evaluate.predictive import Predictive, moments
 from rampe_guard.evaluate.segments import Segment, Start
 
 
@@ -121,17 +121,26 @@ class SiteRampe:
 
     def __init__(self, config: GuardConfig, limits: FloatArray) -> None:
         self._model = Intention(config, limits).rampe
+        self._top_speed = np.array([a.max_velocity for a in config.actuators])
+
+    @property
+    def model(self) -> Rampe:
+        """What was learned."""
+        return self._model
 
     def distribution(self, start: Start) -> Predictive | None:
         """The whole predictive distribution."""
-        known = self._model.predict(start.category, start.q)
-        return None if known is None else StudentPredictive(known, start.category)
+        return self._model.predict(start.category, start.q, start.xi)
 
     def predict(self, start: Start) -> FloatArray | None:
         """Its location (n,) [unit]."""
-        known = self._model.predict(start.category, start.q)
+        known = self._model.predict(start.category, start.q, start.xi)
         return None if known is None else known.mean
 
     def observe(self, segment: Segment) -> None:
-        """Learn."""
-        self._model.observe(segment.start.category, segment.start.q, segment.displacement)
+        """Learn its displacement, and what lever and speed said of it on the way."""
+        start, x = segment.start, segment.displacement
+        forecast = self._model.predict(start.category, start.q, start.xi)
+        refusal = self._model.observe(start.category, start.q, x, start.xi)
+        if refusal is None and forecast is not None:
+            self._model.learn_passing(forecast, moments(segment, self._top_speed), x)

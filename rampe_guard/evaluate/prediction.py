@@ -165,6 +165,7 @@ def assess(
 
     trials = prequential(segments, team, fresh=fresh)
     told = foretell(segments, lambda: SiteRampe(config, limits), fresh=fresh)
+    top_speed = np.array([a.max_velocity for a in config.actuators])
     everything = np.ones(len(trials.run), dtype=np.bool_)
     return Prediction(
         runs=tuple(runs),
@@ -175,8 +176,8 @@ def assess(
         curve=tuple(learning_curve(trials, width)),
         ratios=_ratios(trials, width, everything),
         ratios_known=_ratios(trials, width, known(trials)),
-        calibration=_calibration(told, width),
-        calibration_known=_calibration([t for t in told if t.seen >= KNOWN], width),
+        calibration=_calibration(told, width, top_speed),
+        calibration_known=_calibration([t for t in told if t.seen >= KNOWN], width, top_speed),
     )
 
 
@@ -195,8 +196,8 @@ def _ratios(trials: Trials, width: FloatArray, chosen: Mask) -> dict[str, Interv
     return {name: ratio(trials, width, chosen, RAMPE, name) for name in others}
 
 
-def _calibration(told: Sequence[Foretold], width: FloatArray) -> Calibration:
-    asked = odds(told, width)
+def _calibration(told: Sequence[Foretold], width: FloatArray, top_speed: FloatArray) -> Calibration:
+    asked = odds(told, width, top_speed)
     return Calibration(
         forecasts=sum(t.forecast is not None for t in told),
         coverage=tuple(coverage(told, len(width), level) for level in LEVELS),

@@ -91,7 +91,9 @@ def _curve(axes: Axes, curve: Sequence[CurvePoint]) -> None:
         width = 2.4 if name == RAMPE else 1.4
         axes.plot(at, values, color=colour, marker=marker, markersize=5, lw=width, label=name)
     axes.set_xticks(at, [f"{_bin(p)}\n({p.primitives})" for p in curve], fontsize=8)
-    axes.set_ylim(0.0, _MOST * max(p.errors[ZERO] for p in curve) or 1.0)
+    most = _MOST * max(p.errors[ZERO] for p in curve)
+    top = 1.08 * max(p.errors[name] for p in curve for name in _CURVES)
+    axes.set_ylim(0.0, min(top, most) or 1.0)
     axes.set_title("Error against experience", loc="left", fontsize=10)
     axes.set_xlabel("occurrences of the category before (primitives)")
     axes.set_ylabel("error [share of the range]")

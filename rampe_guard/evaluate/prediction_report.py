@@ -12,9 +12,10 @@ from typing import Any
 
 from rampe_guard import __version__
 from rampe_guard.core.types import FloatArray
-from rampe_guard.evaluate.calibration import AHEAD, SPACING_S, Reliability
+from rampe_guard.evaluate.calibration import AHEAD, Reliability
 from rampe_guard.evaluate.prediction import FORECASTERS, RAMPE, Calibration, Errors, Prediction
 from rampe_guard.evaluate.prediction_score import KNOWN, RESAMPLES, Error, Interval
+from rampe_guard.evaluate.predictive import SPACING_S
 from rampe_guard.evaluate.segments import Run
 from rampe_guard.settings import Site
 
@@ -40,10 +41,10 @@ _DEFINITIONS = {
     ),
     "coverage": "share of displacements inside the central interval, of actuators that move",
     "reliability": (
-        f"at every sample of a primitive under way, at least {SPACING_S:g} s apart, and for each"
-        " actuator that the category moves: the probability that the displacement passes the"
-        f" progress plus {', '.join(f'{a:g}' for a in AHEAD)} of the range, against whether it"
-        " did"
+        f"at every sample from the detection of a primitive to that of its end, at least"
+        f" {SPACING_S:g} s apart, and for each actuator that the category moves: the probability,"
+        f" by progress, lever and speed, that the displacement passes the progress plus"
+        f" {', '.join(f'{a:g}' for a in AHEAD)} of the range, against whether it did"
     ),
     "expected_calibration_error": "mean |said - happened| over the bins, weighted by count",
 }

@@ -20,6 +20,7 @@ from rampe_guard.core.inputs import Accepted, InputGate, Rejection
 from rampe_guard.core.joystick import CategoryChange, CategoryDetector
 from rampe_guard.core.monitor import InputMonitor, Status
 from rampe_guard.core.primitive import FinishedPrimitive, PrimitiveTracker
+from rampe_guard.core.start_observer import StartObserver
 from rampe_guard.core.types import ActuatorSample, Category, FloatArray, InputName, JoystickSample
 from rampe_guard.core.velocity import VelocityEstimator
 from rampe_guard.runtime.csv_log import CsvLog
@@ -37,6 +38,7 @@ class Start:
         q: position at which Ω first appeared, q[k] (n,) [unit].
         velocity: at detection (n,) [unit/s].
         command: filtered lever at detection (n,) [-].
+        xi: ξ, what the site observes beside q (see `core.start_observer`).
         time_s: of detection; the debounce lies between it and the start [s].
     """
 
@@ -44,6 +46,7 @@ class Start:
     q: FloatArray
     velocity: FloatArray
     command: FloatArray
+    xi: FloatArray
     time_s: float
 
 
@@ -167,7 +170,9 @@ class _Follower:
         self._monitor = InputMonitor(config.inputs, start_s)
         self._detector = CategoryDetector(config.actuators, config.joystick)
         self._tracker = PrimitiveTracker()
-        self._velocity = VelocityEstimator(np.array([a.max_velocity for a in config.actuators]))
+        self._top = np.array([a.max_velocity for a in config.actuators])
+        self._velocity = VelocityEstimator(self._top)
+        self._observer = StartObserver(len(config.actuators), config.rampe.observations)
         self._shortest_s = config.joystick.debounce_s
         self._start: Start | None = None
         self._way: list[tuple[float, FloatArray, FloatArray, FloatArray]] = []
@@ -199,6 +204,8 @@ class _Follower:
             self._velocity.update(moved)
             self._tracker.position(moved.stamp_s, moved.position)
             change = self._detector.advance(moved.stamp_s)
+            speed = self._velocity.velocity / self._top
+            self._observer.update(moved.stamp_s, self._detector.command, speed)
             yield from self._changed(change, moved.stamp_s, learn=learn)
             seen = moved.position, self._velocity.velocity, self._detector.command
             self._way.append((moved.stamp_s, *seen))
@@ -217,6 +224,7 @@ class _Follower:
             self._velocity.reset()
             self._tracker.reset()
             self._detector.reset()
+            self._observer.pause()
         return verdict.sample
 
     def _look(self, now_s: float) -> None:
@@ -236,7 +244,8 @@ class _Follower:
         self._start = None
         if current is not None:
             v, u = self._velocity.velocity, self._detector.command
-            self._start = Start(current.category, current.start, v, u, now_s)
+            xi = self._observer.start()
+            self._start = Start(current.category, current.start, v, u, xi, now_s)
 
     def _segment(self, finished: FinishedPrimitive, start: Start, *, learn: bool) -> Segment:
         start_s, end_s = finished.primitive.start_s, finished.end_s

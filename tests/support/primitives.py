@@ -33,6 +33,7 @@ def primitive(
             q=start,
             velocity=np.zeros_like(start) if velocity is None else np.asarray(velocity),
             command=np.array(category, dtype=np.float64),
+            xi=np.zeros(0),
             time_s=0.1,
         ),
         start_s=0.0,

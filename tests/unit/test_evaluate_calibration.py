@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -10,6 +10,7 @@ from scipy import stats
 from scipy.special import stdtr, stdtrit
 
 from rampe_guard.core.config import ActuatorConfig, GuardConfig
+from rampe_guard.core.passing import UnderWay
 from rampe_guard.core.types import FloatArray
 from rampe_guard.evaluate.calibration import (
     AHEAD,
@@ -21,6 +22,7 @@ from rampe_guard.evaluate.calibration import (
     reliability,
 )
 from rampe_guard.evaluate.forecasters import SiteRampe
+from rampe_guard.evaluate.predictive import moments
 from tests.support.primitives import primitive
 
 WIDTH = np.array([2.0, 0.5])
@@ -36,9 +38,12 @@ class Student:
     dof: float = 5.0
 
     def quantile(self, p: float) -> FloatArray:
-        return self.sign * self.mean + self.scale * float(stdtrit(self.dof, p))
+        return self.sign * (self.mean + self.scale * float(stdtrit(self.dof, p)))
 
-    def passing(self, distance: FloatArray, progress: FloatArray) -> FloatArray:
+    def passing(
+        self, distance: FloatArray, progress: FloatArray, under_way: UnderWay | None = None
+    ) -> FloatArray:
+        assert under_way is not None  # it is given, but this law does not need it
         there = np.asarray(stdtr(self.dof, (self.mean - distance) / self.scale), np.float64)
         here = np.asarray(stdtr(self.dof, (self.mean - progress) / self.scale), np.float64)
         return there / here
@@ -92,11 +97,11 @@ def test_actuators_that_do_not_move_and_missing_forecasts_are_not_asked() -> Non
 
 
 def test_the_questions_of_a_primitive() -> None:
-    path = [[0.0, 0.0], [0.1, 0.0], [0.2, 0.01], [0.3, 0.0], [0.9, 0.0]]
-    times_s = [0.0, 0.05, 0.1, 0.2, 0.4]  # the second is too near, the last after its end
+    path = [[0.0, 0.0], [0.1, 0.0], [0.2, 0.01], [0.3, 0.0]]
+    times_s = [0.0, 0.05, 0.1, 0.25]  # the second is too near
     segment = primitive((1, 0), [0, 0], [0.5, 0.0], duration_s=0.3, path=path, times_s=times_s)
     law = Student(np.array([1.0, 0.0]), 0.4 * WIDTH, 0.1 * WIDTH)
-    asked = odds([Foretold(segment, law, 0)], WIDTH)
+    asked = odds([Foretold(segment, law, 0)], WIDTH, WIDTH)
     assert asked.actuator.tolist() == [0] * 15
     distances = [p + 2.0 * a for p in (0.0, 0.2, 0.3) for a in AHEAD]
     assert asked.passed.tolist() == [d <= 0.5 for d in distances]
@@ -105,10 +110,25 @@ def test_the_questions_of_a_primitive() -> None:
     assert asked.said == pytest.approx(expected)
 
 
+def test_a_moment_is_what_the_guard_sees() -> None:
+    path = [[0.1, 0.4], [0.2, 0.3], [0.3, 0.35]]
+    plain = primitive((0, -1), [0, 0.4], [0.3, -0.05], path=path)
+    lever = np.array([[0.2, -0.5], [0.0, -0.9], [-0.4, -0.3]])
+    speed = np.array([[0.1, 0.0], [0.2, -0.2], [0.0, 0.1]])
+    segment = replace(plain, commands=lever, velocities=speed)
+    found = moments(segment, np.array([1.0, 0.4]))
+    assert np.array([m.progress for m in found]) == pytest.approx(
+        np.array([[0.0, 0.0], [0.0, 0.1], [0.0, 0.05]])
+    )
+    assert [m.under_way.command[1] for m in found] == [0.5, 0.9, 0.3]
+    assert [m.under_way.peak[1] for m in found] == [0.5, 0.9, 0.9]
+    assert [m.under_way.speed[1] for m in found] == pytest.approx([0.0, 0.5, 0.0])  # along Ω
+
+
 def test_progress_counts_along_the_sign_and_never_below_zero() -> None:
     segment = primitive((0, -1), [0, 0.4], [0.0, -0.201], path=[[0, 0.45], [0, 0.3]])
     law = Student(np.array([0.0, -1.0]), 0.4 * WIDTH, 0.1 * WIDTH)
-    asked = odds([Foretold(segment, law, 0)], WIDTH)
+    asked = odds([Foretold(segment, law, 0)], WIDTH, WIDTH)
     t = stats.t(5.0, 0.2, 0.05)
     expected = [t.sf(p + 0.5 * a) / t.sf(p) for p in (0.0, 0.1) for a in AHEAD]
     assert asked.said == pytest.approx(expected)
@@ -117,16 +137,16 @@ def test_progress_counts_along_the_sign_and_never_below_zero() -> None:
 
 
 def test_the_true_law_is_reliable_and_a_too_wide_one_is_not() -> None:
-    true = reliability(odds(drawn(2000), WIDTH))
+    true = reliability(odds(drawn(2000), WIDTH, WIDTH))
     assert true.error < 0.02
     enough = true.counts > 200
     assert enough.sum() >= 5
     assert np.abs(true.said - true.happened)[enough].max() < 0.06
-    assert reliability(odds(drawn(2000, wider=3.0), WIDTH)).error > 0.1
+    assert reliability(odds(drawn(2000, wider=3.0), WIDTH, WIDTH)).error > 0.1
 
 
 def test_no_forecast_no_answers_no_figure() -> None:
-    none = odds([Foretold(primitive((1, 0), [0, 0], [1, 0], path=[[0, 0]]), None, 0)], WIDTH)
+    none = odds([Foretold(primitive((1, 0), [0, 0], [1, 0], path=[[0, 0]]), None, 0)], WIDTH, WIDTH)
     found = reliability(none)
     assert found.counts.sum() == 0
     assert np.isnan(found.error)
