@@ -153,7 +153,7 @@ class ModelFile:
         try:
             # without O_NONBLOCK a pipe in its place would let us wait for ever
             descriptor = os.open(self.path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             return None
         except OSError as error:
             raise ModelFileError(f"it cannot be read: {error.strerror or error}") from None

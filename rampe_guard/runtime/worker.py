@@ -16,7 +16,6 @@ from collections.abc import Callable
 from rampe_guard import wire
 from rampe_guard.assembly import Machine
 from rampe_guard.core.events import AlertEvent, Event, PredictionEvent
-from rampe_guard.core.monitor import Status
 from rampe_guard.core.types import Inputs
 from rampe_guard.errors import MessageError
 from rampe_guard.runtime.health import Pulse, TimedSweeper
@@ -67,7 +66,7 @@ class Worker:
         self._acks = bus.desk(f"{base}/ack")
         bus.declare_alive(f"{base}/alive")
         self._prediction: wire.Prediction | None = None
-        self._status: Status | None = None
+        self._status: str | None = None
         self._connected = True
         self._heartbeat: wire.Heartbeat | None = None
 
@@ -124,10 +123,10 @@ class Worker:
         if connected is not self._connected:
             self._connected = connected
             self._say.info("Zenoh router is back" if connected else "Zenoh router is gone")
-        if health.status is not self._status:
-            self._status = health.status
+        if self._heartbeat.status != self._status:
+            self._status = self._heartbeat.status
             why = "; ".join(r.text for r in self._heartbeat.reasons)
-            self._say.info(f"status {health.status.value}{': ' + why if why else ''}")
+            self._say.info(f"status {self._status}{': ' + why if why else ''}")
 
     def _answer(self, now_s: float) -> None:
         for request in self._states.drain():

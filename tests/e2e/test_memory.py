@@ -217,7 +217,8 @@ def test_a_folder_that_cannot_be_written_degrades_and_is_told(workplace: Workpla
         workplace.swing(1)
         assert guard.signal_and_wait(signal.SIGTERM) <= END_S
         assert guard.popen.returncode == 0
-        assert guard.err.count("what is learned is not kept") == 1
+        assert guard.err.count("WARNING rampe_guard: what is learned is not kept") == 1
+        assert "status degraded: what is learned is not kept" in guard.err
         assert "Traceback" not in guard.err
 
 

@@ -259,7 +259,7 @@ def test_what_does_not_change_the_meaning_may_change(tmp_path: Path) -> None:
     site = bench_site(tmp_path)
     limits = bench_limits(site)
     prior = PriorConfig(spread=0.5)
-    rampe = dataclasses.replace(site.guard.rampe, n_init=9, forgetting=0.9, tol=1e-3, prior=prior)
+    rampe = dataclasses.replace(site.guard.rampe, n_init=9, forgetting=0.9, prior=prior)
     other = dataclasses.replace(site, guard=dataclasses.replace(site.guard, rampe=rampe))
     assert misfit(header_of(site, limits), header_of(other, limits * (1 + 1e-12))) is None
 
