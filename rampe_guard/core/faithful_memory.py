@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rampe_guard.core.noise import IndexArray, LearnedNoise
+from rampe_guard.core.noise import LearnedNoise
 from rampe_guard.core.rls import Shared, Stacked
-from rampe_guard.core.types import FloatArray
+from rampe_guard.core.types import FloatArray, Indices
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,9 +24,9 @@ class Group:
         size: parameters of one actuator (shared), or of all.
     """
 
-    actuators: IndexArray
+    actuators: Indices
     rows: tuple[int, ...]
-    owner: IndexArray | None
+    owner: Indices | None
     size: int
 
 

@@ -14,15 +14,11 @@ errors hang together until errors were made.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 from scipy.sparse.csgraph import connected_components
 
-from rampe_guard.core.types import FloatArray
-
-IndexArray: TypeAlias = npt.NDArray[np.intp]
+from rampe_guard.core.types import FloatArray, Indices
 
 _EPS = float(np.finfo(np.float64).eps)
 _SYMMETRY = 1e-9
@@ -59,9 +55,9 @@ class Weighting:
     vectors: FloatArray
     relative: FloatArray
     least: float
-    components: tuple[IndexArray, ...]
+    components: tuple[Indices, ...]
 
-    def restricted(self, actuators: IndexArray) -> Weighting:
+    def restricted(self, actuators: Indices) -> Weighting:
         """The same for ``actuators`` only, a union of components."""
         if len(actuators) == len(self.deviation):
             return self
@@ -107,7 +103,7 @@ def weighting(covariance: FloatArray, *, coupled: bool = False) -> Weighting:
     )
 
 
-def _components(correlation: FloatArray) -> tuple[IndexArray, ...]:
+def _components(correlation: FloatArray) -> tuple[Indices, ...]:
     count, label = connected_components(correlation != 0.0, directed=False)
     return tuple(np.flatnonzero(label == i) for i in range(count))
 

@@ -10,10 +10,10 @@ The model of a category is x = H(y) Θ (n,), H block-diagonal with the row regre
 P⁻¹ is a pseudo-inverse by SVD: singular values below ``tol`` times the largest count as
 zero, so each update ends in a fixed number of steps whatever the data.
 
-**Units.** With D = diag(√R_jj), R = D C D, both P and Θ are kept in units of each actuator's
-own noise: D P D has the blocks (C⁻¹)_ij Σ λ^age h_iᵀ h_j. ``tol`` acts on that matrix. Degrees
-beside metres then cut nothing, and where singular values are exactly zero the
-minimum-norm solution is the same in both units, since D only scales whole blocks.
+**Units.** With D = diag(√R_jj) and R = D C D, (3) and (4) are solved in units of each
+actuator's own noise: D P D has the blocks (C⁻¹)_ij Σ λ^age h_iᵀ h_j. ``tol`` acts on that
+matrix. Degrees beside metres in x then cut nothing, and where singular values are exactly
+zero the minimum-norm solution is the same in both units, since D only scales whole blocks.
 The sums Σ λ^age h_iᵀ h_j do not contain R, so a new R applies to the past as well.
 
 **Three ways to the same result**, chosen for speed:
@@ -39,8 +39,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import lapack
 
-from rampe_guard.core.noise import IndexArray, Weighting
-from rampe_guard.core.types import FloatArray
+from rampe_guard.core.noise import Weighting
+from rampe_guard.core.types import FloatArray, Indices
 
 _EPS = float(np.finfo(np.float64).eps)
 _ESTIMATE_SLACK = 10.0
@@ -185,10 +185,10 @@ class Stacked:
     theta: FloatArray
     moment: FloatArray
     cross: FloatArray
-    owner: IndexArray
+    owner: Indices
 
     @staticmethod
-    def start(h: FloatArray, x: FloatArray, owner: IndexArray, w: Weighting, tol: float) -> Stacked:
+    def start(h: FloatArray, x: FloatArray, owner: Indices, w: Weighting, tol: float) -> Stacked:
         """Blocks 10 to 12: SVD of W₀H₀, Σ r = Uᵀ W₀ x_init, Θ̂ = V r, P = H₀ᵀG₀H₀.
 
         Args:
@@ -248,47 +248,3 @@ class Stacked:
     def _scaled(self, moment: FloatArray, w: Weighting) -> FloatArray:
         """D P D (Σp_j, Σp_j)."""
         return w.inverse[self.owner[:, None], self.owner] * moment
-
-
-@dataclass(frozen=True, slots=True)
-class LeastSquares:
-    """State of the recursion: Θ̂ (p, n) and P (p, p)."""
-
-    theta: FloatArray
-    precision: FloatArray
-
-    def predict(self, h: FloatArray) -> FloatArray:
-        """Equation (2): x̂ (n,) for the regressor h (p,)."""
-        return h @ self.theta
-
-    def update(self, h: FloatArray, x: FloatArray, forgetting: float, tol: float) -> LeastSquares:
-        """Equations (4) and (3): take the observation x (n,) at h (p,)."""
-        precision = forgetting * self.precision + np.outer(h, h)
-        gain = pseudo_inverse(precision, tol) @ h
-        theta = self.theta + np.outer(gain, x - h @ self.theta)
-        return LeastSquares(theta, precision)
-
-
-def from_batch(h: FloatArray, x: FloatArray, tol: float) -> LeastSquares:
-    """Flow-chart blocks 10 to 12: Θ̂ and P from the first observations, by SVD.
-
-    Args:
-        h: regressors (N, p).
-        x: displacements (N, n).
-        tol: relative size below which singular values count as zero.
-    """
-    u, s, vt = np.linalg.svd(h, full_matrices=False)
-    # tol acts on P = HᵀH, whose singular values are the squares
-    keep = s * s > tol * (s[0] * s[0] if s.size else 0.0)
-    theta = vt[keep].T @ ((u[:, keep].T @ x) / s[keep, None])
-    return LeastSquares(theta, h.T @ h)
-
-
-def pseudo_inverse(p: FloatArray, tol: float) -> FloatArray:
-    """Pseudo-inverse of the symmetric (p, p) matrix by SVD, relative threshold ``tol``."""
-    u, s, vt = np.linalg.svd(p, hermitian=True)
-    inverse = np.zeros_like(s)
-    keep = s > tol * s[0]
-    inverse[keep] = 1.0 / s[keep]
-    result: FloatArray = (vt.T * inverse) @ u.T
-    return result

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 from rampe_guard.core.basis import Regressor, affine, constant, quadratic, subset
 from rampe_guard.core.faithful import Faithful
-from rampe_guard.core.noise import IndexArray, weighting
+from rampe_guard.core.noise import weighting
 from rampe_guard.core.rls import Shared, Stacked, cholesky_if_uncut, solve
-from rampe_guard.core.types import FloatArray
+from rampe_guard.core.types import FloatArray, Indices
 
 KINDS: tuple[Regressor, ...] = (
     affine(3),
@@ -164,7 +164,7 @@ def test_rank_deficient_data_give_the_minimum_norm_solution(
     close(theta / unit[owner], expected, 1e-8)
 
 
-def shuffled(noise: FloatArray, order: IndexArray) -> FloatArray:
+def shuffled(noise: FloatArray, order: Indices) -> FloatArray:
     swapped: FloatArray = noise[np.ix_(order, order)]
     return swapped
 
