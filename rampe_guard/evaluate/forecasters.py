@@ -11,10 +11,11 @@ from typing import Protocol
 import numpy as np
 
 from rampe_guard.core.config import GuardConfig
+from rampe_guard.core.displacement import DisplacementForecast
 from rampe_guard.core.intention import Intention
 from rampe_guard.core.rampe import Rampe
 from rampe_guard.core.types import Category, FloatArray
-from rampe_guard.evaluate.predictive import Predictive, moments
+from rampe_guard.evaluate.predictive import moments
 from rampe_guard.evaluate.segments import Segment, Start
 
 
@@ -122,25 +123,30 @@ class SiteRampe:
     def __init__(self, config: GuardConfig, limits: FloatArray) -> None:
         self._model = Intention(config, limits).rampe
         self._top_speed = np.array([a.max_velocity for a in config.actuators])
+        self._said: tuple[Start, DisplacementForecast | None] | None = None
 
     @property
     def model(self) -> Rampe:
         """What was learned."""
         return self._model
 
-    def distribution(self, start: Start) -> Predictive | None:
+    def distribution(self, start: Start) -> DisplacementForecast | None:
         """The whole predictive distribution."""
-        return self._model.predict(start.category, start.q, start.xi)
+        if self._said is None or self._said[0] is not start:  # it is asked more than once
+            known = self._model.predict(start.category, start.q, start.xi)
+            self._said = start, known
+        return self._said[1]
 
     def predict(self, start: Start) -> FloatArray | None:
         """Its location (n,) [unit]."""
-        known = self._model.predict(start.category, start.q, start.xi)
+        known = self.distribution(start)
         return None if known is None else known.mean
 
     def observe(self, segment: Segment) -> None:
         """Learn its displacement, and what lever and speed said of it on the way."""
         start, x = segment.start, segment.displacement
-        forecast = self._model.predict(start.category, start.q, start.xi)
+        forecast = self.distribution(start)
+        self._said = None
         refusal = self._model.observe(start.category, start.q, x, start.xi)
         if refusal is None and forecast is not None:
             self._model.learn_passing(forecast, moments(segment, self._top_speed), x)

@@ -62,7 +62,7 @@ def write_log(path: Path, cycles: int, seed: int) -> Path:
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     folder = tmp_path_factory.mktemp("logs")
-    return [str(write_log(folder / f"day{k}.csv", 8, seed=k)) for k in (1, 2)]
+    return [str(write_log(folder / f"day{k}.csv", 6, seed=k)) for k in (1, 2)]
 
 
 def evaluated(out: Path, *args: str) -> dict[str, Any]:
@@ -94,9 +94,9 @@ def test_a_log_is_evaluated(told: Told) -> None:
     found, shown = told.found, told.shown
     assert [run["log"] for run in found["logs"]] == ["day1.csv", "day2.csv"]
     # the last stroke of a log ends with its rest
-    assert [run["primitives"] for run in found["logs"]] == [32, 32]
-    assert found["total"]["primitives"] == 64
-    assert found["total"]["primitives_known"] == 64 - 4 * 5
+    assert [run["primitives"] for run in found["logs"]] == [24, 24]
+    assert found["total"]["primitives"] == 48
+    assert found["total"]["primitives_known"] == 48 - 4 * 5
     assert found["range"]["stick"] == {"width": 1.0, "unit": "m"}  # it never moved
     assert 1.6 < found["range"]["swing"]["width"] < 2.6
 
@@ -126,16 +126,19 @@ def test_a_log_is_evaluated(told: Told) -> None:
     assert {"rampe-guard", "river", "scikit-learn"} <= found["versions"].keys()
 
 
-def test_the_same_logs_give_the_same_bytes(told: Told, logs: list[str], tmp_path: Path) -> None:
-    evaluated(tmp_path, *logs)
-    assert (tmp_path / "prediction.json").read_bytes() == told.content
+def test_the_same_logs_give_the_same_bytes(tmp_path: Path) -> None:
+    log = str(write_log(tmp_path / "short.csv", 2, seed=5))
+    for out in ("a", "b"):
+        evaluated(tmp_path / out, log)
+    first, again = ((tmp_path / out / "prediction.json").read_bytes() for out in ("a", "b"))
+    assert first == again
 
 
 def test_fresh_means_that_a_log_knows_nothing_of_those_before(
     told: Told, logs: list[str], tmp_path: Path
 ) -> None:
     fresh, carried = evaluated(tmp_path, *logs, "--fresh"), told.found
-    assert fresh["total"]["primitives_known"] == 64 - 2 * 4 * 5
+    assert fresh["total"]["primitives_known"] == 48 - 2 * 4 * 5
     assert fresh["logs"][0] == carried["logs"][0]  # the first knows nothing either way
     before, after = (found["logs"][1]["all"] for found in (fresh, carried))
     assert before["zero"] == after["zero"]
@@ -199,7 +202,9 @@ def test_a_missing_extra_is_named(library: str, logs: list[str], tmp_path: Path)
 @pytest.mark.private_data
 @pytest.mark.skipif(not LOGS.is_dir(), reason="no private logs at ../shared/data")
 def test_a_persons_recorded_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    found = evaluated(tmp_path, str(LOGS / "operator3_run1.csv"))
+    lines = (LOGS / "operator3_run1.csv").read_text("utf-8").splitlines(keepends=True)
+    (tmp_path / "end.csv").write_text(lines[0] + "".join(lines[-2500:]), "utf-8")
+    found = evaluated(tmp_path, str(tmp_path / "end.csv"))
     assert "row left out" in capsys.readouterr().err  # the log ends in half a row
     known = found["total"]["known"]
     assert known["running mean"]["error"] < known["zero"]["error"]
