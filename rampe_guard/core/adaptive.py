@@ -5,16 +5,12 @@ Per category Ω, each step on its own and each learned online::
     experience   newest occurrences (start y, displacement along Ω), weighted λ^age
         │
         ├── radial / ridge      x̂ and variance v from this category alone, from a prior
-        │        └── borrow     the same from categories that differ in one actuator
+        │        └── committee  the same from categories that differ in one actuator
         │                                  │
     scales  (usual displacement) ──► mean, never against Ω, nor past a limit
     spread  (errors made)        ──► scale, degrees of freedom, covariance, shape
     modes   (two futures?)       ──► both ends
     passing (what became of it)  ──► within the primitive: lever and speed
-
-Borrowing: neighbours in Ω are taken to be correlated by c. What a neighbour knows, f and v
-against its prior variance k₀, is to this category a witness with mean c f and variance
-k₀ - c²(k₀ - v); witnesses add up by precision, the prior counted once (a Bayesian committee).
 
 Changes of habit: λ lets old occurrences fade, and a run of errors to one side, or a second
 outlier like the first, makes the older ones count little at once.
@@ -24,18 +20,17 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import stdtr
 
 from rampe_guard.core.basis import affine, quadratic
+from rampe_guard.core.committee import Committee, Estimate
 from rampe_guard.core.config import Basis, RampeConfig
 from rampe_guard.core.displacement import DisplacementForecast
 from rampe_guard.core.experience import Experience
 from rampe_guard.core.modes import TwoFutures, two_futures
 from rampe_guard.core.passing import Moment, PassingModel, UnderWay
-from rampe_guard.core.radial import RadialFit, RadialKernel
 from rampe_guard.core.ridge import Ridge
 from rampe_guard.core.scales import Scales
 from rampe_guard.core.screening import MOST_TAPS, Refusal, is_still, screen
@@ -43,8 +38,6 @@ from rampe_guard.core.spread import BINS, Spread
 from rampe_guard.core.types import Category, FloatArray, Indices
 
 _BASES: tuple[Basis, ...] = ("affine", "quadratic", "radial")
-_WITNESSES = 8
-"""Most neighbours that are heard: the most experienced ones."""
 _OUTLIER = 1e-6
 """A displacement less likely than this, by all that is known, is set aside."""
 _ALIKE = 0.25
@@ -56,16 +49,6 @@ _QUESTIONS = (0.25, 0.5, 1.0, 2.0)
 """Ways ahead of which it is learned whether they were passed [usual displacements]."""
 _MODE_DOF = 4.0
 _LEAST_SCATTER = 0.05
-
-
-@dataclass(frozen=True, slots=True)
-class _Estimate:
-    """x̂ of one category's active actuators (m,), its variance in units of the noise (m,)."""
-
-    mean: FloatArray
-    variance: FloatArray
-    usual: FloatArray
-    related: tuple[Category, ...]
 
 
 class Adaptive:
@@ -88,15 +71,18 @@ class Adaptive:
         basis = config.basis
         self._bases = (basis,) * actuators if isinstance(basis, str) else tuple(basis)
         prior = config.prior
-        self._kernel = RadialKernel(1.0 / prior.weight)
         self.scales = Scales(limits, prior.displacement, observations)
         self.spread = Spread(actuators, prior.spread)
         self.passing = PassingModel(actuators)
         self.experiences: dict[Category, Experience] = {}
         self.refused: Counter[str] = Counter()
-        self._fits: dict[Category, RadialFit] = {}
+        radial = np.array([basis == "radial" for basis in self._bases], dtype=np.float64)
+        self._committee = Committee(config, self.scales, radial)
         self._taps: list[tuple[Category, FloatArray, FloatArray]] = []
+        self._plain = np.tile(np.linspace(0.0, 1.0, BINS + 1), (actuators, 1))
         self._still = 0
+        self._lessons = 0
+        self._latest: tuple[Category, FloatArray, int, Estimate] | None = None
 
     @property
     def basis_codes(self) -> tuple[int, ...]:
@@ -114,9 +100,10 @@ class Adaptive:
         occurrences = 0 if own is None else own.occurrences
         if occurrences < self._config.n_init or not np.isfinite(y).all():
             return None
-        if own is None and not self.scales.moved[active].all():
+        if not (self.scales.moved[active] > 0.0).all() or np.isnan(self.scales.usual[active]).any():
             return None  # an actuator that has never moved: nothing to borrow
-        estimate = self._estimate(category, active, own, y)
+        estimate = self._committee.estimate(category, active, own, y)
+        self._latest = (category, y, self._lessons, estimate)
         return self._forecast(category, active, own, y, estimate)
 
     def observe(self, category: Category, y: FloatArray, x: FloatArray) -> Refusal | None:
@@ -128,12 +115,24 @@ class Adaptive:
             return self._still_primitive(category, y, x)
         if refusal is None:
             for tap in self._taps:
-                self._learn(*tap)
+                late = self._learn(*tap)
+                if late is not None:
+                    self.refused[late] += 1
             self._taps, self._still = [], 0
             refusal = self._learn(category, y, x)
         if refusal is not None:
             self.refused[refusal] += 1
         return refusal
+
+    def _recall(
+        self, category: Category, own: Experience, known: Experience | None, y: FloatArray
+    ) -> Estimate:
+        """The estimate that was forecast, if nothing was learned since, else a new one."""
+        if self._latest is not None:
+            asked, start, lessons, estimate = self._latest
+            if asked == category and lessons == self._lessons and np.array_equal(start, y):
+                return estimate
+        return self._committee.estimate(category, own.active, known, y)
 
     def learn_passing(
         self, forecast: DisplacementForecast, moments: Sequence[Moment], x: FloatArray
@@ -169,18 +168,19 @@ class Adaptive:
         known = self.experiences.get(category)
         own = known or self.begin(category)
         move = np.array(category, dtype=np.float64)[own.active] * x[own.active]
-        estimate = self._estimate(category, own.active, known, y)
+        estimate = self._recall(category, own, known, y)
         if np.isfinite(estimate.usual).all():
             refusal = self._take_error(own, move, estimate)
             if refusal is not None:
-                self.experiences[category] = own
+                self.add(own)
                 return refusal
         own.add(y, move, self._config.memory, self._config.forgetting)
         self.scales.learn(y, x, own.active, move)
-        self.experiences[category] = own
+        self._lessons += 1
+        self.add(own)
         return None
 
-    def _take_error(self, own: Experience, move: FloatArray, estimate: _Estimate) -> Refusal | None:
+    def _take_error(self, own: Experience, move: FloatArray, estimate: Estimate) -> Refusal | None:
         """Learn from how wrong the forecast was; refuse a first outlier."""
         unit = self.spread.unit(estimate.mean, estimate.variance, estimate.usual)
         z = (move - estimate.mean) / unit
@@ -203,15 +203,21 @@ class Adaptive:
             own.distrust()
         return None
 
+    def add(self, own: Experience) -> None:
+        """Make a category known."""
+        if own.category not in self.experiences:
+            self.experiences[own.category] = own
+            self._committee.join(own)
+
     def begin(self, category: Category) -> Experience:
         """An empty memory for a category."""
         own = Experience.of(category, self.width)
         prior = self._config.prior
-        scale = np.where(np.isfinite(self.scales.width), self.scales.width, 1.0)
-        seen = np.isfinite(self.scales.low)
-        middle = np.where(
-            seen, (np.where(seen, self.scales.low, 0) + np.where(seen, self.scales.high, 0)) / 2, 0
-        )
+        inverse, low, high = self.scales.inverse, self.scales.low, self.scales.high
+        scale = np.where(inverse > 0.0, 1.0 / np.where(inverse > 0.0, inverse, 1.0), 1.0)
+        seen = np.isfinite(low)
+        middle = np.zeros(len(low))
+        middle[seen] = (low[seen] + high[seen]) / 2.0
         for name, basis in (("affine", affine(self.width)), ("quadratic", quadratic(self.width))):
             columns = np.flatnonzero([self._bases[j] == name for j in own.active])
             if len(columns):
@@ -219,71 +225,13 @@ class Adaptive:
                 own.ridges.append(Ridge.begin(basis, columns, middle, scale, weights))
         return own
 
-    def _estimate(
-        self, category: Category, active: Indices, own: Experience | None, y: FloatArray
-    ) -> _Estimate:
-        usual = self.scales.usual[active]
-        k0 = self._kernel.variance
-        weighed = np.zeros(len(active))
-        precision: FloatArray = np.full(len(active), 1.0 / k0)
-        if own is not None and own.occurrences:
-            f, v, k = self._alone(own, y)
-            weighed += f / v
-            precision += 1.0 / v - 1.0 / k
-        related = []
-        rho = self._config.borrow
-        for other in self._neighbours(category) if rho > 0.0 else ():
-            f, v, k = self._alone(other, y)
-            v = k - rho * rho * (k - v)
-            here, there = _shared(category, active, other)
-            weighed[here] += rho * f[there] / v[there]
-            precision[here] += 1.0 / v[there] - 1.0 / k[there]
-            related.append(other.category)
-        mean = np.maximum(usual + weighed / precision, 0.0)
-        return _Estimate(mean, 1.0 / precision, usual, tuple(related))
-
-    def _alone(self, own: Experience, y: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Deviation from usual, variance and prior variance (m,) by this category alone."""
-        usual = self.scales.usual[own.active]
-        m = len(usual)
-        f, v, k = np.zeros(m), np.full(m, self._kernel.variance), np.full(m, self._kernel.variance)
-        radial = [i for i, j in enumerate(own.active) if self._bases[j] == "radial"]
-        if radial:
-            fit = self._fit(own)
-            deviation, variance = self._kernel.predict(fit, y / self.scales.width, usual)
-            f[radial], v[radial] = deviation[radial], variance
-        for ridge in own.ridges:
-            at = ridge.columns
-            f[at], v[at], k[at] = ridge.predict(y, usual[at])
-        return f, v, k
-
-    def _fit(self, own: Experience) -> RadialFit:
-        version = (own.version, self.scales.version)
-        fit = self._fits.get(own.category)
-        if fit is None or fit.version != version:
-            fit = self._kernel.fit(own, self.scales.width, version)
-            self._fits[own.category] = fit
-        return fit
-
-    def _neighbours(self, category: Category) -> list[Experience]:
-        """The most experienced categories that differ in one actuator."""
-        found = []
-        for j, sign in enumerate(category):
-            for other in (-1, 0, 1):
-                if other != sign:
-                    known = self.experiences.get((*category[:j], other, *category[j + 1 :]))
-                    if known is not None and known.occurrences:
-                        found.append(known)
-        found.sort(key=lambda e: -e.occurrences)
-        return found[:_WITNESSES]
-
     def _forecast(
         self,
         category: Category,
         active: Indices,
         own: Experience | None,
         y: FloatArray,
-        estimate: _Estimate,
+        estimate: Estimate,
     ) -> DisplacementForecast | None:
         n, q = self.n, y[: self.n]
         sign = np.array(category, dtype=np.float64)
@@ -294,7 +242,7 @@ class Adaptive:
         mean, scale = np.zeros(n), np.zeros(n)
         mean[active] = np.minimum(estimate.mean, room[active])
         scale[active] = standard * unit
-        shape = np.tile(np.linspace(0.0, 1.0, BINS + 1), (n, 1))
+        shape = self._plain.copy()
         shape[active] = self.spread.shapes(active, estimate.mean, estimate.usual)
         degrees = np.full(n, dof)
         modes, weights = None, np.ones(1)
@@ -331,14 +279,5 @@ class Adaptive:
     ) -> TwoFutures | None:
         if own is None or len(own.trust) < self._config.two_futures_from:
             return None
-        fit = self._fit(own)
-        near = self._kernel.closeness(fit, y / self.scales.width)
+        near = self._committee.closeness(own, y)
         return two_futures(own.moves, near * np.minimum(own.trust * 2.0, 1.0), usual)
-
-
-def _shared(category: Category, active: Indices, other: Experience) -> tuple[Indices, Indices]:
-    """Positions of the actuators that both categories move alike, in each one's own order."""
-    signs = np.array(other.category)
-    alike = signs[active] == np.array(category)[active]
-    here = np.flatnonzero(alike)
-    return here, np.searchsorted(other.active, active[here])

@@ -47,7 +47,7 @@ def snapshot(model: Adaptive) -> dict[str, npt.NDArray[np.generic]]:
         "ridge_sums": _flat([a for r in ridges for a in (r.precision, r.moment)]),
         "scale_low": scales.low,
         "scale_high": scales.high,
-        "scale_width": scales.width,
+        "scale_inverse": scales.inverse,
         "scale_moved": scales.moved,
         "scale_count": scales.count,
         "scale_total": scales.total,
@@ -73,7 +73,7 @@ def restore(model: Adaptive, arrays: Arrays) -> Adaptive:
             raise ValueError(f"{name} is {theirs.tolist()}, this estimator has {mine.tolist()}")
     fresh = model.empty()
     scales, spread, passing = fresh.scales, fresh.spread, fresh.passing
-    for name in ("low", "high", "width", "moved", "count", "total", "largest"):
+    for name in ("low", "high", "inverse", "moved", "count", "total", "largest"):
         mine = getattr(scales, name)
         setattr(scales, name, _like(arrays, f"scale_{name}", mine))
     scales.refresh()
@@ -84,7 +84,7 @@ def restore(model: Adaptive, arrays: Arrays) -> Adaptive:
     counts = _like(arrays, "refused", np.zeros(len(_REASONS)))
     fresh.refused = Counter({r: int(c) for r, c in zip(_REASONS, counts, strict=True) if c})
     for own in _experiences(fresh, arrays):
-        fresh.experiences[own.category] = own
+        fresh.add(own)
     return fresh
 
 

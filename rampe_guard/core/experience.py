@@ -81,6 +81,7 @@ class Experience:
 
     def distrust(self) -> None:
         """The habit has changed: what was before the newest occurrences counts little."""
+        self.trust = self.trust.copy()
         self.trust[:-_KEPT] *= _CHANGE_TRUST
         for ridge in self.ridges:
             ridge.discount(_CHANGE_TRUST)

@@ -2,14 +2,15 @@
 
 Paths that are tangent where they part cannot be told apart by start and category: the mean
 lies between two ends that the operator goes to, and is where he never stops. Among the
-occurrences that began near here, the displacements are split in two along their principal
-axis, at the place that leaves the least scatter. They are two futures, and not one wide one,
-if that takes away nearly all scatter (an even spread would keep a quarter of it) and each
-side has a fair share of them.
+occurrences that began near here, the displacements of one actuator are split in two at the
+place that leaves the least scatter, of the actuator that this suits best. They are two
+futures, and not one wide one, if that takes away nearly all scatter (an even spread would
+keep a quarter of it) and each side has a fair share of them.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,7 @@ from rampe_guard.core.types import FloatArray
 _NEAR = 0.5
 """Closeness from which an occurrence began "here"."""
 _LEAST = 8
+_NO_SCATTER = 1e-300
 _LEAST_SIDE = 3
 _LEAST_SHARE = 0.25
 _LEFT_SCATTER = 0.08
@@ -48,23 +50,20 @@ def two_futures(moves: FloatArray, closeness: FloatArray, usual: FloatArray) -> 
     if count < _LEAST:
         return None
     here = moves[near]
-    scaled = (here - here.mean(axis=0)) / usual
-    axis = np.linalg.svd(scaled, full_matrices=False)[2][0] if scaled.shape[1] > 1 else np.ones(1)
-    along = scaled @ axis
-    order = np.argsort(along)
-    ranked = along[order]
-    total = float(ranked @ ranked)
-    left = np.arange(1, count)
-    sums = np.cumsum(ranked)[:-1]
-    # scatter within both sides for every place of the split; the mean of all is 0
-    within = total - sums * sums / left - sums * sums / (count - left)
-    side = np.minimum(left, count - left)
-    allowed = side >= max(_LEAST_SIDE, _LEAST_SHARE * count)
-    within = np.where(allowed, within, np.inf)
-    cut = int(np.argmin(within))
-    if not within[cut] <= _LEFT_SCATTER * total:
+    centred = np.sort(here - here.mean(axis=0), axis=0)
+    total = np.maximum((centred * centred).sum(axis=0), _NO_SCATTER)
+    left = np.arange(1.0, count)
+    sums = np.cumsum(centred, axis=0)[:-1]
+    # share of the scatter within both sides, for every place of the split (k - 1, m)
+    within = 1.0 - sums * sums * (count / (left * (count - left)))[:, None] / total
+    fair = max(_LEAST_SIDE, math.ceil(_LEAST_SHARE * count))
+    within = within[fair - 1 : count - fair]
+    cut, column = np.unravel_index(np.argmin(within), within.shape)
+    if not within[cut, column] <= _LEFT_SCATTER:
         return None
-    low, high = here[order[: cut + 1]], here[order[cut + 1 :]]
+    order = np.argsort(here[:, column])
+    size = int(cut) + fair
+    low, high = here[order[:size]], here[order[size:]]
     ends = np.stack((low.mean(axis=0), high.mean(axis=0)))
     if float(np.max(np.abs(ends[1] - ends[0]) / usual)) < _LEAST_GAP:
         return None

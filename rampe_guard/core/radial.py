@@ -58,9 +58,11 @@ class RadialKernel:
         self._constant = _CONSTANT_SHARE * variance
         self._radial = variance - self._constant
 
-    def fit(self, experience: Experience, width: FloatArray, version: tuple[int, int]) -> RadialFit:
-        """Posterior of a category whose starts are scaled by ``width`` (d,)."""
-        z = experience.starts / width
+    def fit(
+        self, experience: Experience, inverse: FloatArray, version: tuple[int, int]
+    ) -> RadialFit:
+        """Posterior of a category whose starts are multiplied by ``inverse`` (d,)."""
+        z = experience.starts * inverse
         squares = np.einsum("kd,kd->k", z, z)
         gram = self._kernel(squares[:, None] + squares - 2.0 * (z @ z.T), z.shape[1])
         gram.flat[:: len(z) + 1] += 1.0 / experience.trust

@@ -16,7 +16,7 @@ _LEAST_SHARE = 0.25
 _OBSERVATION_WIDTH = 1.7
 """Ranges of an observation ξ beside q that count as one range of q: ξ says less than q."""
 _STALE = 0.05
-"""Relative growth of a width after which everything is scaled anew."""
+"""Relative change of a unit after which everything is scaled anew."""
 _PRIOR_COUNT = 2.0
 """Displacements that the prior's usual displacement is worth."""
 
@@ -30,16 +30,26 @@ class Scales:
         observations: length of ξ.
 
     Attributes:
-        width: unit of each entry of y (n + len(ξ),); infinite while it has not varied.
+        bounded: which actuators have limits (n,).
+        span: range by the limits (n,) [unit]; nan without.
+        slack: the same, 0 without.
+        low, high: what was seen of y (n + len(ξ),).
+        moved: 1 for what the operator has moved, and for ξ (n + len(ξ),).
+        count: displacements behind ``usual`` (n,).
+        total: their sum (n,) [unit].
+        largest: the largest of them (n,) [unit].
+        inverse: 1 / unit of each entry of y (n + len(ξ),); 0 while it has not varied.
         usual: usual displacement (n,) [unit]; nan while unknown.
-        version: grows when ``width`` changes.
+        version: grows when ``inverse`` changes.
     """
 
     def __init__(self, limits: FloatArray, displacement: float, observations: int = 0) -> None:
         n = len(limits)
         span = limits[:, 1] - limits[:, 0]
         known = np.isfinite(span)
+        self.bounded = known
         self.span: FloatArray = np.where(known, span, np.nan)
+        self.slack: FloatArray = np.where(known, span, 0.0)
         self._extra = np.concatenate((np.ones(n), np.full(observations, _OBSERVATION_WIDTH)))
         self._least = np.concatenate(
             (np.where(known, _LEAST_SHARE * span, 0.0), np.zeros(observations))
@@ -53,7 +63,7 @@ class Scales:
         self.total: FloatArray = np.where(known, _PRIOR_COUNT * displacement * span, 0.0)
         self.largest: FloatArray = np.zeros(n)
         self.version = 0
-        self.width: FloatArray = np.where(self._least > 0.0, self._least, np.inf)
+        self.inverse: FloatArray = np.zeros(n + observations)
         self._measure_usual()
 
     def learn(
@@ -83,13 +93,14 @@ class Scales:
         self._measure_usual()
 
     def measure(self) -> None:
-        """Adopt the widths that were seen, if they differ enough from those in force."""
-        reach = np.clip(self.high - self.low, self._least, self._most)
+        """Adopt the units that were seen, if they differ enough from those in force."""
+        reach = np.minimum(np.maximum(self.high - self.low, self._least), self._most)
         # what the operator has not moved yet, or what never varied, tells starts not apart
-        width = np.where((self.moved > 0.0) & (reach > 0.0), reach * self._extra, np.inf)
-        same = np.isclose(width, self.width, rtol=_STALE)
-        if not same.all():
-            self.width = width
+        told = (self.moved > 0.0) & (reach > 0.0)
+        inverse = np.zeros(len(reach))
+        inverse[told] = 1.0 / (reach[told] * self._extra[told])
+        if (np.abs(inverse - self.inverse) > _STALE * self.inverse).any():
+            self.inverse = inverse
             self.version += 1
 
     def _measure_usual(self) -> None:

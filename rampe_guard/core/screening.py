@@ -47,7 +47,7 @@ _SETTLED_COUNT = 5.0
 
 def is_still(x: FloatArray, scales: Scales) -> bool:
     """True if nothing moved at all in the displacement x (n,)."""
-    span = np.where(np.isfinite(scales.span), scales.span, np.maximum(scales.largest, _STILL))
+    span = np.where(scales.bounded, scales.span, np.maximum(scales.largest, _STILL))
     return bool((np.abs(x) <= _STILL * span).all())
 
 
@@ -63,29 +63,32 @@ def screen(
         limits: (n, 2) [unit], infinite where there are none.
         scales: learned units.
     """
-    if not (np.isfinite(q).all() and np.isfinite(x).all()):
+    end = q + x
+    if not np.isfinite(end).all():  # neither could be NaN or infinite without the sum being so
         return "not_finite"
-    sign = np.array(category, dtype=np.float64)
-    span = _span(scales)
-    ends = np.stack((q, q + x))
-    known = np.isfinite(scales.span)
-    slack = np.where(known, _SLACK * np.nan_to_num(scales.span), 0.0)
-    if ((ends < limits[:, 0] - slack) | (ends > limits[:, 1] + slack)).any():
+    if scales.bounded.any() and (
+        (np.minimum(q, end) < limits[:, 0] - _SLACK * scales.slack).any()
+        or (np.maximum(q, end) > limits[:, 1] + _SLACK * scales.slack).any()
+    ):
         return "outside_limits"
-    share = np.abs(x) / span
-    if (sign * x < 0.0)[share > _AGAINST].any():
+    sign = np.array(category, dtype=np.float64)
+    moved = x / _span(scales)
+    if (sign * moved < -_AGAINST).any():
         return "against_lever"
     driven = sign != 0.0
+    share = np.abs(moved)
     if share[~driven].sum() > max(share[driven].sum(), _AGAINST):
         return "wrong_actuator"
-    far = np.abs(x) > _IMPOSSIBLE * scales.largest
-    if (far & driven & ~known & (scales.count >= _SETTLED_COUNT)).any():
+    settled = driven & ~scales.bounded & (scales.count >= _SETTLED_COUNT)
+    if (np.abs(x) > _IMPOSSIBLE * scales.largest)[settled].any():
         return "impossible"
     return None
 
 
 def _span(scales: Scales) -> FloatArray:
     """Range per actuator [unit]: by its limits, else as worked in; infinite while unknown."""
+    if scales.bounded.all():
+        return scales.span
     worked = (scales.high - scales.low)[: len(scales.span)]
     settled = (scales.count >= _SETTLED_COUNT) & (worked > 0.0)
-    return np.where(np.isfinite(scales.span), scales.span, np.where(settled, worked, np.inf))
+    return np.where(scales.bounded, scales.span, np.where(settled, worked, np.inf))
