@@ -137,19 +137,22 @@ def _load(site: Site) -> _Model:
     rampe = Intention(site.guard, limits).rampe
     try:
         content = ModelFile(path).read()
-        if content is not None:
-            recall(content, header_of(site, limits), rampe)
-            return _Model(path, len(content), *decode(content), tuple(rampe.table()))
+    except ModelFileError as error:
+        raise ModelFileError(f"{path}: {error}") from None
+    if content is None:
+        others = ", ".join(map(repr, _operators(site)))
+        raise ModelFileError(
+            f"nothing is kept of operator {site.operator!r} yet: there is no {path}"
+            + (f"; kept here: {others}" if others else "")
+            + "; a guard under systemd keeps its models in its $STATE_DIRECTORY"
+        )
+    try:
+        recall(content, header_of(site, limits), rampe)
     except ModelFileError as error:
         raise ModelFileError(
             f"{path}: {error}; a guard would set this file aside and start with nothing learned"
         ) from None
-    others = _operators(site)
-    raise ModelFileError(
-        f"nothing is kept of operator {site.operator!r} yet: there is no {path}"
-        + (f"; kept here: {', '.join(map(repr, others))}" if others else "")
-        + "; a guard under systemd keeps its models in its $STATE_DIRECTORY"
-    )
+    return _Model(path, len(content), *decode(content), tuple(rampe.table()))
 
 
 def _operators(site: Site) -> list[str]:

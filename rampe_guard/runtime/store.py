@@ -120,7 +120,8 @@ class ModelFile:
             holder = os.pread(descriptor, 20, 0).decode("ascii", "replace").strip()
             os.close(descriptor)
             raise ModelFileError(
-                f"{self.path} is held by a running guard, process {holder or 'unknown'}"
+                f"{self.path} is held by a running guard, process {holder or 'unknown'};"
+                " stop that first"
             ) from None
         except BaseException:
             os.close(descriptor)

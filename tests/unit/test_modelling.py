@@ -128,6 +128,14 @@ def test_a_model_that_a_guard_would_refuse_is_said_and_left_alone() -> None:
     assert path.exists()
 
 
+def test_a_model_that_cannot_be_read_is_said() -> None:
+    path = teach()
+    path.unlink()
+    path.mkdir()
+    with pytest.raises(ModelFileError, match=f"{path}: it is not a regular file$"):
+        show_model(SITE, None, Console())
+
+
 def test_a_model_of_another_operator_under_this_name_is_refused() -> None:
     other, path = teach("ben"), teach("anna")
     path.write_bytes(other.read_bytes())
@@ -157,7 +165,7 @@ def test_reset_of_nothing_makes_nothing(tmp_path: Path) -> None:
 
 def test_reset_is_refused_while_a_guard_would_save_again() -> None:
     path = teach()
-    with ModelFile(path), pytest.raises(ModelFileError, match="is held by a running guard"):
+    with ModelFile(path), pytest.raises(ModelFileError, match=r"running guard.*stop that first"):
         reset_model(SITE, None, Console(), sure=True)
     assert path.exists()
 
