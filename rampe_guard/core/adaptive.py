@@ -43,11 +43,13 @@ _OUTLIER = 1e-6
 _ALIKE = 0.25
 """Two outliers that differ less than this share of the usual displacement are a habit."""
 _DRIFT_MEMORY = 0.8
-_DRIFT_LIMIT = 6.0
-"""Sum of standardised errors, fading, that chance does not reach (3.6 standard deviations)."""
+_DRIFT_LIMIT = 7.5
+"""Sum of standardised errors, fading, that chance hardly reaches (some 4 standard deviations)."""
 _QUESTIONS = (0.25, 0.5, 1.0, 2.0)
 """Ways ahead of which it is learned whether they were passed [usual displacements]."""
 _MODE_DOF = 4.0
+_NO_DOF = 4.0
+"""Of an actuator that does not move: any will do."""
 _LEAST_SCATTER = 0.05
 
 
@@ -244,7 +246,8 @@ class Adaptive:
         scale[active] = standard * unit
         shape = self._plain.copy()
         shape[active] = self.spread.shapes(active, estimate.mean, estimate.usual)
-        degrees = np.full(n, dof)
+        degrees = np.full(n, _NO_DOF)
+        degrees[active] = dof
         modes, weights = None, np.ones(1)
         futures = self._futures(own, y, estimate.usual)
         if futures is not None:
@@ -254,7 +257,7 @@ class Adaptive:
             scale[active] = np.maximum(futures.scatter, _LEAST_SCATTER * estimate.usual)
             degrees = np.full(n, _MODE_DOF)
             modes = sign * modes
-        signed = sign[active] * scale[active] * np.sqrt(degrees[active] / (degrees[active] - 2.0))
+        signed = sign[active] * scale[active] * _deviation(degrees[active])
         covariance = np.zeros((n, n))
         covariance[np.ix_(active, active)] = np.outer(signed, signed) * self.spread.correlation(
             own, len(active)
@@ -281,3 +284,10 @@ class Adaptive:
             return None
         near = self._committee.closeness(own, y)
         return two_futures(own.moves, near * np.minimum(own.trust * 2.0, 1.0), usual)
+
+
+def _deviation(dof: FloatArray) -> FloatArray:
+    """Standard deviation of a Student-t of scale 1; below 3 degrees it is that of 3."""
+    freedom = np.maximum(dof, 3.0)
+    result: FloatArray = np.sqrt(freedom / (freedom - 2.0))
+    return result

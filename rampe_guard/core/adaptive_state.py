@@ -52,7 +52,7 @@ def snapshot(model: Adaptive) -> dict[str, npt.NDArray[np.generic]]:
         "scale_count": scales.count,
         "scale_total": scales.total,
         "scale_largest": scales.largest,
-        "spread_errors": spread.errors,
+        "spread_sizes": spread.sizes,
         "spread_squares": spread.squares,
         "spread_shape": spread.shape,
         "passing_mean": passing.mean,
@@ -77,8 +77,9 @@ def restore(model: Adaptive, arrays: Arrays) -> Adaptive:
         mine = getattr(scales, name)
         setattr(scales, name, _like(arrays, f"scale_{name}", mine))
     scales.refresh()
-    for name in ("errors", "squares", "shape"):
+    for name in ("sizes", "squares", "shape"):
         setattr(spread, name, _finite(arrays, f"spread_{name}", getattr(spread, name)))
+    spread.refresh(np.arange(model.n))
     for name in ("mean", "precision"):
         setattr(passing, name, _finite(arrays, f"passing_{name}", getattr(passing, name)))
     counts = _like(arrays, "refused", np.zeros(len(_REASONS)))

@@ -6,16 +6,21 @@ are standardised by it and by the variance v of the estimate itself,
 
     z = e / sqrt(u (x̂ + ε u) (1 + v)),    u the actuator's usual displacement,
 
-and the mean of z² is learned per actuator, and for each category on top of that (inverse
-gamma: Student-t). Products of the z of different actuators give R(Ω) its correlations. What a
-Student-t about the mean cannot say (many displacements are near zero, few are very long) is
-learned too: a histogram of where displacements fell in their forecast distribution, for
-short, usual and long forecasts of each actuator.
+and the sizes |z| of each actuator are counted. Scale and degrees of freedom of the Student-t
+are those that put half of them inside its central 50 % interval and nine tenths inside its
+90 % interval. A category scatters more or less than its actuators do on average: by the ratio
+of its z² to theirs, drawn towards 1 (large z cut off, so that no single one decides).
+Products of the z of different actuators give R(Ω) its correlations.
+
+What a symmetric law about the mean cannot say (many displacements are near zero, few are very
+long) is learned too: a histogram of where displacements fell in their forecast distribution,
+for short, usual and long forecasts of each actuator.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import stdtr, stdtrit
 
 from rampe_guard.core.experience import Experience
 from rampe_guard.core.types import FloatArray, Indices
@@ -24,12 +29,21 @@ BINS = 10
 """Resolution of the learned shape."""
 _SMALL = 0.1
 """ε: below this share of the usual displacement the spread stops shrinking."""
-_POOL = 6.0
-"""Errors of a category that the actuator's own spread is worth; least degrees of freedom."""
-_PRIOR_ERRORS = 3.0
+_POOL = 20.0
+"""Errors of a category that its actuators' own spread is worth."""
+_PRIOR_ERRORS = 6.0
 """Errors that the prior spread is worth."""
+_PRIOR_DOF = 4.0
 _MOST_DOF = 60.0
-_SHAPE_WEIGHT = 10.0
+_CUT = 6.0
+"""z² beyond this many times its mean counts no more for the spread of a category."""
+_EDGES = np.concatenate(([0.0], np.geomspace(0.005, 50.0, 41), [np.inf]))
+"""Borders of the histogram of |z|."""
+_DOF = np.array([1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 30.0, _MOST_DOF])
+_EDGES_IN_USE = np.append(_EDGES[1:-1], 2.0 * _EDGES[-2])
+_TAIL_RATIO = stdtrit(_DOF, 0.95) / stdtrit(_DOF, 0.75)
+"""Half width of the central 90 % over that of the central 50 %: tells degrees of freedom."""
+_SHAPE_WEIGHT = 15.0
 """Displacements that the belief in the plain Student-t is worth."""
 _CLASSES = np.array([0.5, 1.5])
 """Borders between short, usual and long forecasts [usual displacements]."""
@@ -43,14 +57,21 @@ class Spread:
         prior: standard deviation of a displacement about its model [share of its size].
 
     Attributes:
-        errors: number of errors per actuator (n,), with the prior's.
-        squares: sum of their z² (n,), with the prior's.
+        sizes: counts (n, bins) of |z|, with the prior's.
+        squares: sum of the z², cut off, and their number (n, 2), with the prior's.
+        scale: scale of z (n,).
+        dof: degrees of freedom of z (n,).
         shape: counts (n, 3, BINS) of displacements by class and by where they fell.
     """
 
     def __init__(self, actuators: int, prior: float) -> None:
-        self.errors: FloatArray = np.full(actuators, _PRIOR_ERRORS)
-        self.squares: FloatArray = np.full(actuators, _PRIOR_ERRORS * prior * prior)
+        borders = 2.0 * stdtr(_PRIOR_DOF, _EDGES / prior) - 1.0
+        self.sizes: FloatArray = np.tile(_PRIOR_ERRORS * np.diff(borders), (actuators, 1))
+        spread = prior * prior * _PRIOR_DOF / (_PRIOR_DOF - 2.0)
+        self.squares: FloatArray = np.tile([_PRIOR_ERRORS * spread, _PRIOR_ERRORS], (actuators, 1))
+        self.scale: FloatArray = np.empty(actuators)
+        self.dof: FloatArray = np.empty(actuators)
+        self.refresh(np.arange(actuators))
         self.shape: FloatArray = np.full((actuators, len(_CLASSES) + 1, BINS), _SHAPE_WEIGHT / BINS)
 
     def unit(self, mean: FloatArray, variance: FloatArray, usual: FloatArray) -> FloatArray:
@@ -58,24 +79,36 @@ class Spread:
         result: FloatArray = np.sqrt(usual * (mean + _SMALL * usual) * (1.0 + variance))
         return result
 
-    def standard(self, experience: Experience | None, active: Indices) -> tuple[FloatArray, float]:
-        """Learned scale of z (m,) and its degrees of freedom."""
-        pooled = self.squares[active] / self.errors[active]
+    def standard(
+        self, experience: Experience | None, active: Indices
+    ) -> tuple[FloatArray, FloatArray]:
+        """Learned scale of z and its degrees of freedom (m,) each."""
+        scale, dof = self.scale[active], self.dof[active]
         if experience is None:
-            return np.sqrt(pooled), _POOL
-        own = np.diagonal(experience.surprise)
-        dof = _POOL + experience.evidence
-        return np.sqrt((_POOL * pooled + own) / dof), min(dof, _MOST_DOF)
+            return scale, dof
+        pooled = self.squares[active, 0] / self.squares[active, 1]
+        ratio = np.diagonal(experience.surprise) / pooled
+        return scale * np.sqrt((_POOL + ratio) / (_POOL + experience.evidence)), dof
 
     def correlation(self, experience: Experience | None, size: int) -> FloatArray:
         """Correlation of the errors (m, m), drawn towards none."""
-        if experience is None:
+        if experience is None or size == 1:
             return np.eye(size)
-        pooled = self.squares[experience.active] / self.errors[experience.active]
+        active = experience.active
+        pooled = self.squares[active, 0] / self.squares[active, 1]
         total = experience.surprise + np.diag(_POOL * pooled)
         root = np.sqrt(np.diagonal(total))
-        result: FloatArray = total / np.outer(root, root)
+        result: FloatArray = total / (root[:, None] * root)
         return result
+
+    def refresh(self, active: Indices) -> None:
+        """Scale and degrees of freedom from the counted sizes."""
+        for j in active:
+            cumulated = np.cumsum(self.sizes[j])
+            cumulated /= cumulated[-1]
+            half, most = np.interp((0.5, 0.9), cumulated, _EDGES_IN_USE)
+            self.dof[j] = np.interp(-most / half, -_TAIL_RATIO, _DOF)
+            self.scale[j] = half / stdtrit(self.dof[j], 0.75)
 
     def shapes(self, active: Indices, mean: FloatArray, usual: FloatArray) -> FloatArray:
         """Cumulated shape (m, BINS + 1) of forecasts of size ``mean`` (m,), from 0 to 1."""
@@ -95,11 +128,15 @@ class Spread:
     ) -> None:
         """Take standardised errors z (m,) that fell at the quantiles ``passed`` (m,)."""
         active = experience.active
-        self.errors[active] += 1.0
-        self.squares[active] += z * z
+        self.sizes[active, np.searchsorted(_EDGES, np.abs(z), side="right") - 1] += 1.0
+        self.refresh(active)
+        limit = np.sqrt(_CUT * self.squares[active, 0] / self.squares[active, 1])
+        cut = np.clip(z, -limit, limit)
+        self.squares[active, 0] += cut * cut
+        self.squares[active, 1] += 1.0
         bins = np.minimum((passed * BINS).astype(np.intp), BINS - 1)
         self.shape[active, self._classes(mean, usual), bins] += 1.0
-        experience.surprise = forgetting * experience.surprise + np.outer(z, z)
+        experience.surprise = forgetting * experience.surprise + cut[:, None] * cut
         experience.evidence = forgetting * experience.evidence + 1.0
 
     def _classes(self, mean: FloatArray, usual: FloatArray) -> Indices:

@@ -3,7 +3,8 @@
 Two questions about the predictive distribution of the site's RAMPE:
 
 * coverage: how often does the displacement lie in the central 50 % and 90 % interval that was
-  given at the start of a primitive?
+  given at the start of a primitive? It is of the motion along Ω: an arm that still coasts the
+  other way, or gives under its load, has gone 0 along it.
 * reliability: while a primitive is under way with progress p, what is the chance that it will
   pass d > p, by what lever and speed say as well, and how often does it? This is the
   probability that alerts are made of.
@@ -83,13 +84,12 @@ def coverage(told: Sequence[Foretold], n: int, level: float) -> Coverage:
     for one in told:
         if one.forecast is None:
             continue
-        # quantiles run along Ω: where it is negative, the far end of the interval is the lower
-        near, far = (one.forecast.quantile(p) for p in (0.5 - level / 2, 0.5 + level / 2))
-        low, high = np.minimum(near, far), np.maximum(near, far)
-        moved = np.array(one.segment.start.category) != 0
-        x = one.segment.displacement
+        sign = np.array(one.segment.start.category, dtype=np.float64)
+        near, far = (sign * one.forecast.quantile(p) for p in (0.5 - level / 2, 0.5 + level / 2))
+        along = np.maximum(sign * one.segment.displacement, 0.0)
+        moved = sign != 0.0
         asked += moved
-        inside += moved & (low <= x) & (x <= high)
+        inside += moved & (near <= along) & (along <= far)
     total = int(asked.sum())
     share = np.divide(inside, asked, out=np.full(n, np.nan), where=asked > 0)
     return Coverage(level, share, asked, int(inside.sum()) / total if total else np.nan)
