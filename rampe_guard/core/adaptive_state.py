@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rampe_guard.core.experience import Experience
+from rampe_guard.core.scales import Scales
 from rampe_guard.core.screening import Refusal
 from rampe_guard.core.types import FloatArray
 
@@ -28,6 +29,11 @@ _REASONS: tuple[str, ...] = get_args(Refusal)
 def snapshot(model: Adaptive) -> dict[str, npt.NDArray[np.generic]]:
     """All that ``model`` has learned; primitives without motion that wait are left out."""
     own = list(model.experiences.values())
+    # copies: the model may learn on while another thread writes them
+    return {name: np.array(values) for name, values in _views(model, own).items()}
+
+
+def _views(model: Adaptive, own: list[Experience]) -> dict[str, npt.NDArray[np.generic]]:
     ridges = [r for e in own for r in e.ridges]
     scales, spread, passing = model.scales, model.spread, model.passing
     return {
@@ -52,7 +58,7 @@ def snapshot(model: Adaptive) -> dict[str, npt.NDArray[np.generic]]:
         "scale_count": scales.count,
         "scale_total": scales.total,
         "scale_largest": scales.largest,
-        "spread_sizes": spread.sizes,
+        "spread_errors": spread.errors,
         "spread_squares": spread.squares,
         "spread_shape": spread.shape,
         "passing_mean": passing.mean,
@@ -76,29 +82,34 @@ def restore(model: Adaptive, arrays: Arrays) -> Adaptive:
     for name in ("low", "high", "inverse", "moved", "count", "total", "largest"):
         mine = getattr(scales, name)
         setattr(scales, name, _like(arrays, f"scale_{name}", mine))
+    _check_scales(scales)
     scales.refresh()
-    for name in ("sizes", "squares", "shape"):
-        setattr(spread, name, _finite(arrays, f"spread_{name}", getattr(spread, name)))
-    spread.refresh(np.arange(model.n))
+    for name in ("errors", "squares", "shape"):
+        setattr(spread, name, _counts(arrays, f"spread_{name}", getattr(spread, name)))
     for name in ("mean", "precision"):
         setattr(passing, name, _finite(arrays, f"passing_{name}", getattr(passing, name)))
-    counts = _like(arrays, "refused", np.zeros(len(_REASONS)))
+    _check_moments("passing_precision", passing.precision)
+    if passing.mean[0] <= 0.0:
+        raise ValueError(f"passing_mean begins with {passing.mean[0]}, must be above 0")
+    counts = _counts(arrays, "refused", np.zeros(len(_REASONS)))
     fresh.refused = Counter({r: int(c) for r, c in zip(_REASONS, counts, strict=True) if c})
     for own in _experiences(fresh, arrays):
+        if own.category in fresh.experiences:
+            raise ValueError(f"category {own.category} is there twice")
         fresh.add(own)
     return fresh
 
 
 def _experiences(model: Adaptive, arrays: Arrays) -> list[Experience]:
-    categories = _entry(arrays, "categories").astype(np.int64)
-    total = len(categories)
-    if categories.shape != (total, model.n) or (np.abs(categories) > 1).any():
+    categories = _entry(arrays, "categories")
+    total = categories.size // model.n
+    if categories.shape != (total, model.n) or not np.isin(categories, (-1, 0, 1)).all():
         raise ValueError(f"categories of shape {categories.shape}, need signs ({total}, {model.n})")
     per = {
-        name: _finite(arrays, name, np.zeros(total))
+        name: _counts(arrays, name, np.zeros(total))
         for name in ("occurrences", "remembered", "evidence", "suspected")
     }
-    if (per["remembered"] < 0).any() or (per["occurrences"] < per["remembered"]).any():
+    if (per["occurrences"] < per["remembered"]).any():
         raise ValueError("a category remembers more primitives than it has seen")
     names = ("starts", "moves", "trust", "surprise", "drift", "suspects")
     rolls = {name: _Roll(name, arrays) for name in (*names, "ridge_scales", "ridge_sums")}
@@ -121,8 +132,12 @@ def _experiences(model: Adaptive, arrays: Arrays) -> list[Experience]:
             ridge.width = rolls["ridge_scales"].take(*ridge.width.shape)
             ridge.precision = rolls["ridge_sums"].take(*ridge.precision.shape)
             ridge.moment = rolls["ridge_sums"].take(*ridge.moment.shape)
-        if (own.trust <= 0.0).any():
-            raise ValueError("trust must be above 0")
+            _check_moments("ridge_sums", ridge.precision)
+            if (ridge.width <= 0.0).any():
+                raise ValueError("a unit in ridge_scales must be above 0")
+        _check_moments("surprise", own.surprise)
+        if ((own.trust <= 0.0) | (own.trust > 1.0)).any():
+            raise ValueError("trust must lie in (0, 1]")
         result.append(own)
     for roll in rolls.values():
         roll.end()
@@ -169,7 +184,10 @@ def _flat(arrays: list[FloatArray]) -> FloatArray:
 def _entry(arrays: Arrays, name: str) -> npt.NDArray[np.generic]:
     if name not in arrays:
         raise ValueError(f"{name} is missing")
-    return np.asarray(arrays[name])
+    values = np.asarray(arrays[name])
+    if values.dtype.kind not in "biuf":
+        raise ValueError(f"{name} holds {values.dtype}, not numbers")
+    return values
 
 
 def _like(arrays: Arrays, name: str, mine: FloatArray) -> FloatArray:
@@ -184,3 +202,30 @@ def _finite(arrays: Arrays, name: str, mine: FloatArray) -> FloatArray:
     if not np.isfinite(values).all():
         raise ValueError(f"{name} is not finite")
     return values
+
+
+def _counts(arrays: Arrays, name: str, mine: FloatArray) -> FloatArray:
+    values = _finite(arrays, name, mine)
+    if (values < 0.0).any():
+        raise ValueError(f"{name} has {values.min()}, no number of things")
+    return values
+
+
+def _check_scales(scales: Scales) -> None:
+    for name in ("inverse", "moved", "count", "total", "largest"):
+        values = getattr(scales, name)
+        if not np.isfinite(values).all() or (values < 0.0).any():
+            raise ValueError(f"scale_{name} is {values.tolist()}, must be finite and not below 0")
+    seen = np.isfinite(scales.low) & (scales.low <= scales.high) & np.isfinite(scales.high)
+    never = (scales.low == np.inf) & (scales.high == -np.inf)
+    if not (seen | never).all():
+        raise ValueError(f"seen from {scales.low.tolist()} to {scales.high.tolist()}")
+
+
+def _check_moments(name: str, moments: FloatArray) -> None:
+    """A sum of zzᵀ is symmetric and has no negative eigenvalue."""
+    size = float(np.trace(moments))
+    if not np.allclose(moments, moments.T, rtol=1e-9, atol=1e-9 * abs(size)):
+        raise ValueError(f"{name} is not symmetric")
+    if np.linalg.eigvalsh(moments)[0] < -1e-9 * abs(size):
+        raise ValueError(f"{name} is no sum of squares")
