@@ -58,7 +58,7 @@ def _views(model: Adaptive, own: list[Experience]) -> dict[str, npt.NDArray[np.g
         "scale_count": scales.count,
         "scale_total": scales.total,
         "scale_largest": scales.largest,
-        "spread_errors": spread.errors,
+        "spread_sizes": spread.sizes,
         "spread_squares": spread.squares,
         "spread_shape": spread.shape,
         "passing_mean": passing.mean,
@@ -84,8 +84,9 @@ def restore(model: Adaptive, arrays: Arrays) -> Adaptive:
         setattr(scales, name, _like(arrays, f"scale_{name}", mine))
     _check_scales(scales)
     scales.refresh()
-    for name in ("errors", "squares", "shape"):
+    for name in ("sizes", "squares", "shape"):
         setattr(spread, name, _counts(arrays, f"spread_{name}", getattr(spread, name)))
+    spread.refresh(np.arange(model.n))
     for name in ("mean", "precision"):
         setattr(passing, name, _finite(arrays, f"passing_{name}", getattr(passing, name)))
     _check_moments("passing_precision", passing.precision)
