@@ -110,7 +110,7 @@ class Adaptive:
 
     def observe(self, category: Category, y: FloatArray, x: FloatArray) -> Refusal | None:
         """Blocks 5 to 15, 17, 18: learn that a primitive from y went x (n,), or say why not."""
-        refusal = screen(category, y[: self.n], x, self._limits, self.scales)
+        refusal = screen(category, y[: self.n], x, self.scales)
         if refusal is None and not np.isfinite(y).all():
             refusal = "not_finite"
         if refusal is None and is_still(x, self.scales):
@@ -188,7 +188,8 @@ class Adaptive:
         z = (move - estimate.mean) / unit
         standard, dof = self.spread.standard(own, own.active)
         passed = np.asarray(stdtr(dof, z / standard), dtype=np.float64)
-        if 2.0 * np.minimum(passed, 1.0 - passed).min() < _OUTLIER / len(z):
+        deviation, count = self.spread.deviation(own)
+        if 2.0 * stdtr(count, -np.abs(z) / deviation).min() < _OUTLIER / len(z):
             before, own.suspect = own.suspect, move
             alike = before is not None and bool(
                 (np.abs(move - before) <= _ALIKE * np.maximum(estimate.usual, before)).all()
@@ -200,7 +201,7 @@ class Adaptive:
             return None  # a new habit; its distance from the old one is no spread
         own.suspect = None
         self.spread.learn(own, z, passed, estimate.mean, estimate.usual, self._config.forgetting)
-        own.drift = _DRIFT_MEMORY * own.drift + z / standard
+        own.drift = _DRIFT_MEMORY * own.drift + z / deviation
         if np.abs(own.drift).max() > _DRIFT_LIMIT:
             own.distrust()
         return None
@@ -262,6 +263,9 @@ class Adaptive:
         covariance[np.ix_(active, active)] = np.outer(signed, signed) * self.spread.correlation(
             own, len(active)
         )
+        if modes is not None:
+            between = modes[0] - modes[1]
+            covariance += weights[0] * weights[1] * np.outer(between, between)
         return DisplacementForecast(
             category=category,
             mean=sign * mean,

@@ -35,6 +35,8 @@ _PRIOR_ERRORS = 6.0
 """Errors that the prior spread is worth."""
 _PRIOR_DOF = 4.0
 _MOST_DOF = 60.0
+_FRESH = 1.02
+"""Growth of the number of errors after which scale and degrees of freedom are reckoned anew."""
 _CUT = 6.0
 """z² beyond this many times its mean counts no more for the spread of a category."""
 _EDGES = np.concatenate(([0.0], np.geomspace(0.005, 50.0, 41), [np.inf]))
@@ -61,6 +63,7 @@ class Spread:
         squares: sum of the z², cut off, and their number (n, 2), with the prior's.
         scale: scale of z (n,).
         dof: degrees of freedom of z (n,).
+        due: number of errors from which both are reckoned anew (n,).
         shape: counts (n, 3, BINS) of displacements by class and by where they fell.
     """
 
@@ -71,6 +74,7 @@ class Spread:
         self.squares: FloatArray = np.tile([_PRIOR_ERRORS * spread, _PRIOR_ERRORS], (actuators, 1))
         self.scale: FloatArray = np.empty(actuators)
         self.dof: FloatArray = np.empty(actuators)
+        self.due: FloatArray = np.zeros(actuators)
         self.refresh(np.arange(actuators))
         self.shape: FloatArray = np.full((actuators, len(_CLASSES) + 1, BINS), _SHAPE_WEIGHT / BINS)
 
@@ -89,6 +93,18 @@ class Spread:
         pooled = self.squares[active, 0] / self.squares[active, 1]
         ratio = np.diagonal(experience.surprise) / pooled
         return scale * np.sqrt((_POOL + ratio) / (_POOL + experience.evidence)), dof
+
+    def deviation(self, experience: Experience) -> tuple[FloatArray, float]:
+        """Root mean square of z (m,), the large ones cut off, and its degrees of freedom.
+
+        The measure for what is no error at all: the tails of `standard` tell what large errors
+        do happen, and with few counted they would let anything pass.
+        """
+        active = experience.active
+        pooled = self.squares[active, 0] / self.squares[active, 1]
+        count = _POOL + experience.evidence
+        mean = (_POOL * pooled + np.diagonal(experience.surprise)) / count
+        return np.sqrt(mean), min(count, _MOST_DOF)
 
     def correlation(self, experience: Experience | None, size: int) -> FloatArray:
         """Correlation of the errors (m, m), drawn towards none."""
@@ -109,6 +125,7 @@ class Spread:
             half, most = np.interp((0.5, 0.9), cumulated, _EDGES_IN_USE)
             self.dof[j] = np.interp(-most / half, -_TAIL_RATIO, _DOF)
             self.scale[j] = half / stdtrit(self.dof[j], 0.75)
+            self.due[j] = _FRESH * self.squares[j, 1]
 
     def shapes(self, active: Indices, mean: FloatArray, usual: FloatArray) -> FloatArray:
         """Cumulated shape (m, BINS + 1) of forecasts of size ``mean`` (m,), from 0 to 1."""
@@ -129,7 +146,9 @@ class Spread:
         """Take standardised errors z (m,) that fell at the quantiles ``passed`` (m,)."""
         active = experience.active
         self.sizes[active, np.searchsorted(_EDGES, np.abs(z), side="right") - 1] += 1.0
-        self.refresh(active)
+        due = active[self.squares[active, 1] >= self.due[active]]
+        if len(due):
+            self.refresh(due)
         limit = np.sqrt(_CUT * self.squares[active, 0] / self.squares[active, 1])
         cut = np.clip(z, -limit, limit)
         self.squares[active, 0] += cut * cut
