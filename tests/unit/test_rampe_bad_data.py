@@ -184,15 +184,15 @@ def test_several_outliers_among_good_ones(limits: FloatArray | None) -> None:
 @known_or_not
 def test_two_outliers_alike_in_a_row_are_a_change_of_habit(limits: FloatArray | None) -> None:
     model, operator = learned(limits)
-    assert model.observe(UP, [-1.0, 0.5], [1.8, 0.0]) == "outlier"
-    assert model.observe(UP, [-1.0, 0.45], [1.9, 0.0]) is None
+    assert model.observe(UP, [-1.0, 0.5], [2.4, 0.0]) == "outlier"
+    assert model.observe(UP, [-1.0, 0.45], [2.5, 0.0]) is None
     assert model.refused == {"outlier": 1}
     for _ in range(4):
-        q = operator.start() - [0.5, 0.0]
-        assert model.observe(UP, q, np.array([1.85, 0.0])) is None
-    p = model.predict(UP, [-0.8, 0.5])
+        q = [operator.rng.uniform(-1.2, -0.8), 0.5]
+        assert model.observe(UP, q, np.array([2.45, 0.0])) is None
+    p = model.predict(UP, [-1.0, 0.5])
     assert p is not None
-    assert abs(p.mean[0] - 1.85) < 0.25
+    assert abs(p.mean[0] - 2.45) < 0.3
     other = model.predict((0, 1), [0.0, 0.5])
     assert other is not None
     assert abs(other.mean[1] - 0.3) < 0.03
