@@ -61,6 +61,9 @@ def _views(model: Adaptive, own: list[Experience]) -> dict[str, npt.NDArray[np.g
         "spread_sizes": spread.sizes,
         "spread_squares": spread.squares,
         "spread_shape": spread.shape,
+        "spread_scale": spread.scale,
+        "spread_dof": spread.dof,
+        "spread_due": spread.due,
         "passing_mean": passing.mean,
         "passing_precision": passing.precision,
         "refused": np.array([model.refused[reason] for reason in _REASONS], dtype=np.int64),
@@ -84,9 +87,8 @@ def restore(model: Adaptive, arrays: Arrays) -> Adaptive:
         setattr(scales, name, _like(arrays, f"scale_{name}", mine))
     _check_scales(scales)
     scales.refresh()
-    for name in ("sizes", "squares", "shape"):
+    for name in ("sizes", "squares", "shape", "scale", "dof", "due"):
         setattr(spread, name, _counts(arrays, f"spread_{name}", getattr(spread, name)))
-    spread.refresh(np.arange(model.n))
     for name in ("mean", "precision"):
         setattr(passing, name, _finite(arrays, f"passing_{name}", getattr(passing, name)))
     _check_moments("passing_precision", passing.precision)

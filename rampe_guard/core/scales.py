@@ -17,6 +17,8 @@ _OBSERVATION_WIDTH = 1.7
 """Ranges of an observation ξ beside q that count as one range of q: ξ says less than q."""
 _STALE = 0.05
 """Relative change of a unit after which everything is scaled anew."""
+_SLACK = 0.05
+"""How far beyond its limits an actuator may be measured [share of the range]."""
 _PRIOR_COUNT = 2.0
 """Displacements that the prior's usual displacement is worth."""
 
@@ -32,7 +34,7 @@ class Scales:
     Attributes:
         bounded: which actuators have limits (n,).
         span: range by the limits (n,) [unit]; nan without.
-        slack: the same, 0 without.
+        lowest, highest: the least and greatest position that can be measured (n,) [unit].
         low, high: what was seen of y (n + len(ξ),).
         moved: 1 for what the operator has moved, and for ξ (n + len(ξ),).
         count: displacements behind ``usual`` (n,).
@@ -49,7 +51,9 @@ class Scales:
         known = np.isfinite(span)
         self.bounded = known
         self.span: FloatArray = np.where(known, span, np.nan)
-        self.slack: FloatArray = np.where(known, span, 0.0)
+        self.all_bounded = bool(known.all())
+        self.lowest: FloatArray = limits[:, 0] - np.where(known, _SLACK * span, 0.0)
+        self.highest: FloatArray = limits[:, 1] + np.where(known, _SLACK * span, 0.0)
         self._extra = np.concatenate((np.ones(n), np.full(observations, _OBSERVATION_WIDTH)))
         self._least = np.concatenate(
             (np.where(known, _LEAST_SHARE * span, 0.0), np.zeros(observations))
@@ -75,24 +79,30 @@ class Scales:
     ) -> None:
         """Take a primitive from y (n + len(ξ),) that went x (n,), by ``move`` along Ω (m,)."""
         n = len(x)
-        self.moved[active] = 1.0
         end = y.copy()
         end[:n] += x
-        self.low = np.minimum(self.low, np.minimum(y, end))
-        self.high = np.maximum(self.high, np.maximum(y, end))
+        low = np.minimum(self.low, np.minimum(y, end))
+        high = np.maximum(self.high, np.maximum(y, end))
+        further = (low < self.low).any() or (high > self.high).any()
+        if further or not self.moved[active].all():
+            self.low, self.high = low, high
+            self.moved[active] = 1.0
+            self._measure()
         size = np.abs(move)
         self.total[active] += size
         self.count[active] += 1.0
         self.largest[active] = np.maximum(self.largest[active], size)
-        self._measure_usual()
-        self.measure()
+        if self.total[active].all():
+            self.usual[active] = self.total[active] / self.count[active]
+        else:
+            self._measure_usual()
 
     def refresh(self) -> None:
         """Take up what was restored."""
         self.version += 1
         self._measure_usual()
 
-    def measure(self) -> None:
+    def _measure(self) -> None:
         """Adopt the units that were seen, if they differ enough from those in force."""
         reach = np.minimum(np.maximum(self.high - self.low, self._least), self._most)
         # what the operator has not moved yet, or what never varied, tells starts not apart

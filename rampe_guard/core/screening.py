@@ -20,6 +20,7 @@ from __future__ import annotations
 from typing import Literal, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from rampe_guard.core.scales import Scales
 from rampe_guard.core.types import Category, FloatArray
@@ -35,8 +36,6 @@ Refusal: TypeAlias = Literal[
 ]
 MOST_TAPS = 2
 """Primitives without motion in a row that may be taps; more is a frozen sensor."""
-_SLACK = 0.05
-"""How far beyond its limits an actuator may be measured [share of the range]."""
 _AGAINST = 0.1
 """Motion against the lever that lag and load explain [share of the range]."""
 _IMPOSSIBLE = 20.0
@@ -47,29 +46,27 @@ _SETTLED_COUNT = 5.0
 
 def is_still(x: FloatArray, scales: Scales) -> bool:
     """True if nothing moved at all in the displacement x (n,)."""
+    size = np.abs(x)
+    if scales.all_bounded:
+        return bool((size <= _STILL * scales.span).all())
     span = np.where(scales.bounded, scales.span, np.maximum(scales.largest, _STILL))
-    return bool((np.abs(x) <= _STILL * span).all())
+    return bool((size <= _STILL * span).all())
 
 
-def screen(
-    category: Category, q: FloatArray, x: FloatArray, limits: FloatArray, scales: Scales
-) -> Refusal | None:
+def screen(category: Category, q: FloatArray, x: FloatArray, scales: Scales) -> Refusal | None:
     """Reason not to learn the primitive from q (n,) that went x (n,), or None.
 
     Args:
         category: Ω.
         q: start [unit].
         x: displacement [unit].
-        limits: (n, 2) [unit], infinite where there are none.
         scales: learned units.
     """
     end = q + x
     if not np.isfinite(end).all():  # neither could be NaN or infinite without the sum being so
         return "not_finite"
-    if scales.bounded.any() and (
-        (np.minimum(q, end) < limits[:, 0] - _SLACK * scales.slack).any()
-        or (np.maximum(q, end) > limits[:, 1] + _SLACK * scales.slack).any()
-    ):
+    lowest, highest = np.minimum(q, end), np.maximum(q, end)
+    if (lowest < scales.lowest).any() or (highest > scales.highest).any():
         return "outside_limits"
     sign = np.array(category, dtype=np.float64)
     moved = x / _span(scales)
@@ -79,15 +76,17 @@ def screen(
     share = np.abs(moved)
     if share[~driven].sum() > max(share[driven].sum(), _AGAINST):
         return "wrong_actuator"
+    return None if scales.all_bounded else _too_far(driven, x, scales)
+
+
+def _too_far(driven: npt.NDArray[np.bool_], x: FloatArray, scales: Scales) -> Refusal | None:
     settled = driven & ~scales.bounded & (scales.count >= _SETTLED_COUNT)
-    if (np.abs(x) > _IMPOSSIBLE * scales.largest)[settled].any():
-        return "impossible"
-    return None
+    return "impossible" if (np.abs(x) > _IMPOSSIBLE * scales.largest)[settled].any() else None
 
 
 def _span(scales: Scales) -> FloatArray:
     """Range per actuator [unit]: by its limits, else as worked in; infinite while unknown."""
-    if scales.bounded.all():
+    if scales.all_bounded:
         return scales.span
     worked = (scales.high - scales.low)[: len(scales.span)]
     settled = (scales.count >= _SETTLED_COUNT) & (worked > 0.0)

@@ -43,9 +43,10 @@ def test_silence_freezes_the_alerts_and_says_not_monitoring(live: Station, silen
     time.sleep(1.0)
     frozen = [h.body for h in ears.since(beat.at_s + 0.1, "alert") if h.body["source"] != "system"]
     assert len(frozen) >= 3  # republished at 5 Hz
-    assert {(b["zone"], b["level"], b["quality"]) for b in frozen} == {
-        ("crate", "imminent", "stale")
-    }
+    assert {b["quality"] for b in frozen} == {"stale"}
+    shown = {(b["zone"], b["level"]) for b in frozen}
+    assert ("crate", "imminent") in shown
+    assert len(shown) == len({zone for zone, _ in shown})  # no level changes any more
     beats = [h.body["status"] for h in ears.since(beat.at_s, "heartbeat")]
     assert set(beats) == {"not_monitoring"}
 
