@@ -95,6 +95,11 @@ class Guard:
         """The learned models."""
         return self._intention.rampe
 
+    @property
+    def lessons(self) -> dict[str, int]:
+        """Finished primitives: "learned", and the others by the reason why not."""
+        return dict(self._intention.lessons)
+
     def step(self, inputs: Inputs, now_s: float) -> tuple[Event, ...]:
         """Take all that arrived since the last step; returns what is to be published."""
         self._monitor.joystick_alive(inputs.joystick_alive)

@@ -6,6 +6,7 @@ whose displacement is learned, and starts the next, whose displacement is foreca
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Literal
 
 import numpy as np
@@ -33,6 +34,7 @@ class Intention:
     Attributes:
         rampe: the learned models.
         forecast: x̂ of the primitive under way, or None.
+        lessons: finished primitives, "learned" or by the reason why not.
     """
 
     def __init__(self, config: GuardConfig, limits: FloatArray) -> None:
@@ -48,6 +50,7 @@ class Intention:
             observations=self._observer.size,
         )
         self.forecast: DisplacementForecast | None = None
+        self.lessons: Counter[str] = Counter()
         self._seq = 0
         self._updated_s = float("-inf")
         self._stamp_s = 0.0
@@ -130,6 +133,7 @@ class Intention:
         finished = self._tracker.change(change)
         if finished is not None:
             refusal = self._learn(finished) if learn else "inputs_refused"
+            self.lessons[refusal or "learned"] += 1
             summary = self._summary(finished.primitive, finished.displacement)
             events.append(self._event("ended", summary, now_s, refusal=refusal))
         self.forecast = None

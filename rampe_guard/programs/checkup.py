@@ -10,6 +10,7 @@ from rich.text import Text
 from rampe_guard.assembly import Machine, load_machine
 from rampe_guard.core.scene import ActuatorLimit, SceneObject
 from rampe_guard.core.types import FloatArray
+from rampe_guard.runtime.store import model_path
 from rampe_guard.runtime.zenoh_io import check_configuration
 from rampe_guard.settings import Site, load_site
 
@@ -51,11 +52,12 @@ def _table(title: str, *columns: str) -> Table:
 
 
 def _keys(site: Site) -> Table:
-    table = _table("keys", "what", "key")
+    table = _table("keys and files", "what", "where")
     table.add_row("joystick", site.keys.joystick)
     table.add_row("actuators", site.keys.actuators)
     table.add_row("published under", site.keys.base)
     table.add_row("zenoh", site.zenoh.config or f"{site.zenoh.mode} {' '.join(site.zenoh.connect)}")
+    table.add_row("learned models", str(model_path(site)) if site.memory.enabled else "not kept")
     return table
 
 

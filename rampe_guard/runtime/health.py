@@ -106,7 +106,12 @@ class Pulse:
         self._seq = 0
 
     def beat(
-        self, health: Health, now_s: float, overruns: int, extra: Iterable[wire.Reason] = ()
+        self,
+        health: Health,
+        now_s: float,
+        overruns: int,
+        primitives: dict[str, int],
+        extra: Iterable[wire.Reason] = (),
     ) -> wire.Heartbeat:
         """A heartbeat; ``extra`` are reasons that only the daemon knows (no router, say)."""
         self._seq += 1
@@ -133,6 +138,7 @@ class Pulse:
             rates_hz=self._rates.update(now_s, health.accepted),
             accepted={str(k): v for k, v in health.accepted.items()},
             rejected=rejected,
+            primitives=primitives,
             drops=overruns,
             loop_ms=self.loop_ms.quantiles(),
             sweep_ms=self.sweep_ms.quantiles(),

@@ -118,7 +118,9 @@ class Worker:
         if not connected:
             extra.append(wire.Reason(code="no_router", text="no Zenoh router", key=None))
         health = self._guard.snapshot(now_s).health
-        self._heartbeat = self._pulse.beat(health, now_s, self._intake.overruns, extra)
+        self._heartbeat = self._pulse.beat(
+            health, now_s, self._intake.overruns, self._guard.lessons, extra
+        )
         self._beats.put(wire.encode(self._heartbeat))
         if connected is not self._connected:
             self._connected = connected

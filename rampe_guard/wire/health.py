@@ -69,6 +69,10 @@ class Heartbeat(Message, frozen=True, kw_only=True):
         dict[str, dict[str, int]],
         Meta(description="Messages refused since the boot, by input, then reason."),
     ]
+    primitives: Annotated[
+        dict[str, int],
+        Meta(description="Finished primitives since the boot: learned, or by why they were not."),
+    ]
     drops: Annotated[
         int | None, Meta(description="Messages lost to full queues since the boot; null unknown.")
     ]

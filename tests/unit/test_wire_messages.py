@@ -117,6 +117,7 @@ HEARTBEAT = Heartbeat(
     rates_hz=InputRates(joystick=None, actuators=50.0),
     accepted={"joystick": 0, "actuators": 10},
     rejected={"joystick": {"bad_json": 2}},
+    primitives={"learned": 3, "outlier": 1},
     drops=None,
     loop_ms=Quantiles(p50=1.0, p99=3.0),
     sweep_ms=None,
