@@ -39,6 +39,7 @@ HEARTBEAT = Heartbeat(
     rates_hz=InputRates(joystick=50.0, actuators=None),
     accepted={},
     rejected={},
+    primitives={},
     drops=None,
     loop_ms=Quantiles(p50=1.1, p99=4.2),
     sweep_ms=None,
