@@ -38,7 +38,9 @@ _MOST_DOF = 60.0
 _FRESH = 1.02
 """Growth of the number of errors after which scale and degrees of freedom are reckoned anew."""
 _CUT = 6.0
-"""z² beyond this many times its mean counts no more for the spread of a category."""
+"""z² beyond this many times the category's own counts no more for its spread."""
+_BEGUN = 2.0
+"""Errors that the scale is worth in the mean of z²."""
 _EDGES = np.concatenate(([0.0], np.geomspace(0.005, 50.0, 41), [np.inf]))
 """Borders of the histogram of |z|."""
 _DOF = np.array([1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 30.0, _MOST_DOF])
@@ -60,7 +62,7 @@ class Spread:
 
     Attributes:
         sizes: counts (n, bins) of |z|, with the prior's.
-        squares: sum of the z², cut off, and their number (n, 2), with the prior's.
+        squares: sum of the z², cut off, and their number (n, 2).
         scale: scale of z (n,).
         dof: degrees of freedom of z (n,).
         due: number of errors from which both are reckoned anew (n,).
@@ -70,8 +72,7 @@ class Spread:
     def __init__(self, actuators: int, prior: float) -> None:
         borders = 2.0 * stdtr(_PRIOR_DOF, _EDGES / prior) - 1.0
         self.sizes: FloatArray = np.tile(_PRIOR_ERRORS * np.diff(borders), (actuators, 1))
-        spread = prior * prior * _PRIOR_DOF / (_PRIOR_DOF - 2.0)
-        self.squares: FloatArray = np.tile([_PRIOR_ERRORS * spread, _PRIOR_ERRORS], (actuators, 1))
+        self.squares: FloatArray = np.zeros((actuators, 2))
         self.scale: FloatArray = np.empty(actuators)
         self.dof: FloatArray = np.empty(actuators)
         self.due: FloatArray = np.zeros(actuators)
@@ -90,8 +91,7 @@ class Spread:
         scale, dof = self.scale[active], self.dof[active]
         if experience is None:
             return scale, dof
-        pooled = self.squares[active, 0] / self.squares[active, 1]
-        ratio = np.diagonal(experience.surprise) / pooled
+        ratio = np.diagonal(experience.surprise) / self._pooled(active)
         return scale * np.sqrt((_POOL + ratio) / (_POOL + experience.evidence)), dof
 
     def deviation(self, experience: Experience) -> tuple[FloatArray, float]:
@@ -101,9 +101,8 @@ class Spread:
         do happen, and with few counted they would let anything pass.
         """
         active = experience.active
-        pooled = self.squares[active, 0] / self.squares[active, 1]
         count = _POOL + experience.evidence
-        mean = (_POOL * pooled + np.diagonal(experience.surprise)) / count
+        mean = (_POOL * self._pooled(active) + np.diagonal(experience.surprise)) / count
         return np.sqrt(mean), min(count, _MOST_DOF)
 
     def correlation(self, experience: Experience | None, size: int) -> FloatArray:
@@ -111,8 +110,7 @@ class Spread:
         if experience is None or size == 1:
             return np.eye(size)
         active = experience.active
-        pooled = self.squares[active, 0] / self.squares[active, 1]
-        total = experience.surprise + np.diag(_POOL * pooled)
+        total = experience.surprise + np.diag(_POOL * self._pooled(active))
         root = np.sqrt(np.diagonal(total))
         result: FloatArray = total / (root[:, None] * root)
         return result
@@ -149,7 +147,7 @@ class Spread:
         due = active[self.squares[active, 1] >= self.due[active]]
         if len(due):
             self.refresh(due)
-        limit = np.sqrt(_CUT * self.squares[active, 0] / self.squares[active, 1])
+        limit = np.sqrt(_CUT) * self.deviation(experience)[0]
         cut = np.clip(z, -limit, limit)
         self.squares[active, 0] += cut * cut
         self.squares[active, 1] += 1.0
@@ -157,6 +155,16 @@ class Spread:
         self.shape[active, self._classes(mean, usual), bins] += 1.0
         experience.surprise = forgetting * experience.surprise + cut[:, None] * cut
         experience.evidence = forgetting * experience.evidence + 1.0
+
+    def _pooled(self, active: Indices) -> FloatArray:
+        """Mean of z² (m,), cut off, of all categories; begun from the scale that holds now.
+
+        A prior many times too wide would stay in a mean for hundreds of errors, but not in
+        the median that the scale follows.
+        """
+        total, count = self.squares[active].T
+        result: FloatArray = (total + _BEGUN * self.scale[active] ** 2) / (count + _BEGUN)
+        return result
 
     def _classes(self, mean: FloatArray, usual: FloatArray) -> Indices:
         return np.searchsorted(_CLASSES, mean / usual)
