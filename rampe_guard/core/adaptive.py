@@ -72,6 +72,8 @@ class Adaptive:
         self._config = config
         basis = config.basis
         self._bases = (basis,) * actuators if isinstance(basis, str) else tuple(basis)
+        if len(self._bases) != actuators or not set(self._bases) <= set(_BASES):
+            raise ValueError(f"basis is {basis}, must be one of {_BASES} or {actuators} of them")
         prior = config.prior
         self.scales = Scales(limits, prior.displacement, observations)
         self.spread = Spread(actuators, prior.spread)
