@@ -8,8 +8,9 @@ on the log-odds of the survival form:
 
 with u the lever now, u_max its largest push in this primitive, and an offset b_j per actuator.
 w₀ stays positive, so P falls with d as it must. Learned online by Newton steps on the
-penalised likelihood of what became of each primitive (its moments together count as a few
-observations, since they share one end).
+penalised likelihood of what became of each primitive. Every moment counts alike: at a moment
+taken at random, a long primitive is more likely under way than a short one, and that is the
+moment at which a guard asks.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ _PRIOR_MEAN = (1.0, 4.0, 0.0, 0.0)
 """Before any experience: the survival form, less what a released lever says."""
 _PRIOR_PRECISION = (4.0, 1.0, 1.0, 1.0)
 _OFFSET_PRECISION = 3.0
-_COUNT = 6.0
-"""Observations that the moments of one primitive and actuator count as."""
+_COUNT = 0.1
+"""Observations that one question at one moment counts as: those of a primitive share one end."""
 _FORGETTING = 0.999
 
 
@@ -103,11 +104,10 @@ class PassingModel:
         rows[:, 1:SHARED] = _lever(under_way).T
         index = actuator.astype(np.intp)
         rows[np.arange(len(ratio)), SHARED + index] = 1.0
-        share = _COUNT / np.bincount(index)[index]
         p = expit(rows @ self.mean)
         kept = self._prior + _FORGETTING * (self.precision - self._prior)
-        self.precision = kept + (rows.T * (share * p * (1.0 - p))) @ rows
-        step = np.linalg.solve(self.precision, rows.T @ (share * (passed - p)))
+        self.precision = kept + (rows.T * (_COUNT * p * (1.0 - p))) @ rows
+        step = np.linalg.solve(self.precision, _COUNT * (rows.T @ (passed - p)))
         self.mean = self.mean + step
         self.mean[0] = max(self.mean[0], _LEAST_SLOPE)
 
