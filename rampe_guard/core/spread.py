@@ -29,7 +29,7 @@ BINS = 10
 """Resolution of the learned shape."""
 _SMALL = 0.1
 """ε: below this share of the usual displacement the spread stops shrinking."""
-_POOL = 20.0
+_POOL = 12.0
 """Errors of a category that its actuators' own spread is worth."""
 _PRIOR_ERRORS = 6.0
 """Errors that the prior spread is worth."""
@@ -47,7 +47,7 @@ _DOF = np.array([1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 30.0, _MOST
 _EDGES_IN_USE = np.append(_EDGES[1:-1], 2.0 * _EDGES[-2])
 _TAIL_RATIO = stdtrit(_DOF, 0.95) / stdtrit(_DOF, 0.75)
 """Half width of the central 90 % over that of the central 50 %: tells degrees of freedom."""
-_SHAPE_WEIGHT = 15.0
+_SHAPE_WEIGHT = 10.0
 """Displacements that the belief in the plain Student-t is worth."""
 _CLASSES = np.array([0.5, 1.5])
 """Borders between short, usual and long forecasts [usual displacements]."""

@@ -174,10 +174,10 @@ def test_faithful_equals_batch_weighted_least_squares(seed: int, count: int, lam
     for qi, xi in zip(q, x, strict=True):
         assert model.observe((1, 1), qi, xi) is None
     h = np.column_stack([q, np.ones(count)])
-    w = np.sqrt(lam ** np.arange(count - 1, -1, -1.0))[:, None]
+    w = np.array([[np.sqrt(lam**age)] for age in reversed(range(count))], dtype=np.float64)
     assume(np.linalg.cond((w * h)[:4]) < 1e4)
     assume(np.linalg.cond(w * h) < 1e4)
-    theta: FloatArray = np.linalg.lstsq(w * h, w * x, rcond=None)[0]
+    theta = np.asarray(np.linalg.lstsq(w * h, w * x, rcond=None)[0], dtype=np.float64)
     at = np.array([0.3, 0.2])
     p = model.predict((1, 1), at)
     assert p is not None
