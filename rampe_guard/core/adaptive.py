@@ -198,8 +198,7 @@ class Adaptive:
             )
             if not alike:
                 return "outlier"
-            own.distrust()
-            own.suspect = None
+            own.distrust()  # the suspect stays: a third one like it is not held up again
             return None  # a new habit; its distance from the old one is no spread
         own.suspect = None
         self.spread.learn(own, z, passed, estimate.mean, estimate.usual, self._config.forgetting)
