@@ -24,7 +24,7 @@ LIMITS = np.array([[-40.0, 40.0], [-8.0, 24.0]])
 PRIOR = PriorConfig()
 seeds = st.integers(0, 100_000)
 forgettings = st.sampled_from([1.0, 0.98, 0.9])
-few = settings(max_examples=25, deadline=None)
+few = settings(max_examples=20, deadline=None)
 
 
 @dataclass
@@ -301,22 +301,31 @@ def test_witnesses_with_equal_experience_are_heard_whatever_the_order() -> None:
     same(forecast(other, (0, 0, 0, 0, 0, 1), q), transformed(p, order, np.ones(6)))
 
 
-@pytest.mark.parametrize("limits", [True, False], ids=["limits", "unlimited"])
-@pytest.mark.parametrize("basis", ["radial"])
-@given(seed=seeds, n=st.sampled_from([1, 2, 4]), exponent=st.floats(-4.0, 4.0))
-@few
-def test_units_of_an_actuator_do_not_matter(
-    basis: Basis, seed: int, n: int, exponent: float, *, limits: bool
-) -> None:
-    """From metres to micrometres: its own forecast is scaled, and that of no other changes."""
-    one = stream(seed, n)
-    factor = np.ones(n)
-    factor[seed % n] = 10.0**exponent
+def same_in_other_units(one: Stream, basis: Basis, factor: FloatArray, *, limits: bool) -> None:
     model = one.model(basis, limits=limits)
     other = one.scaled(factor).model(basis, limits=limits)
     assert model.refused == other.refused
-    back = 1.0 / factor
     for category, q, _ in one.steps[-8:]:
+        found = forecast(other, category, q * factor)
         p = forecast(model, category, q)
-        found = transformed(forecast(other, category, q * factor), list(range(n)), back)
-        same(found, p)
+        same(transformed(found, list(range(one.n)), 1.0 / factor), p)
+
+
+@given(
+    seed=seeds, n=st.sampled_from([1, 2, 4]), exponent=st.floats(-4.0, 4.0), limits=st.booleans()
+)
+@settings(max_examples=20, deadline=None)
+def test_units_of_an_actuator_do_not_matter(
+    seed: int, n: int, exponent: float, *, limits: bool
+) -> None:
+    """From metres to micrometres: its own forecast is scaled, and that of no other changes."""
+    factor = np.ones(n)
+    factor[seed % n] = 10.0**exponent
+    same_in_other_units(stream(seed, n), "radial", factor, limits=limits)
+
+
+@pytest.mark.xfail(reason="a category begun before its actuators moved has its slopes in raw units")
+@pytest.mark.parametrize("limits", [True, False], ids=["limits", "unlimited"])
+@pytest.mark.parametrize("basis", ["affine", "quadratic"])
+def test_units_do_not_matter_to_the_other_bases(basis: Basis, *, limits: bool) -> None:
+    same_in_other_units(stream(0, 2), basis, np.array([1.0, 100.0]), limits=limits)

@@ -183,7 +183,7 @@ def damage(array: npt.NDArray[Any], how: str, draw: st.DataObject) -> npt.NDArra
     "how", ["nan", "infinite", "minus", "truncated", "longer", "reshaped", "text", "dropped"]
 )
 @given(draw=st.data())
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_damaged_arrays_are_refused_and_change_nothing(
     basis: Any, how: str, draw: st.DataObject
 ) -> None:
