@@ -170,7 +170,7 @@ class Adaptive:
 
     def _learn(self, category: Category, y: FloatArray, x: FloatArray) -> Refusal | None:
         known = self.experiences.get(category)
-        own = known or self.begin(category)
+        own = known or self.begin(category, y)
         move = np.array(category, dtype=np.float64)[own.active] * x[own.active]
         estimate = self._recall(category, own, known, y)
         if np.isfinite(estimate.usual).all():
@@ -213,20 +213,17 @@ class Adaptive:
             self.experiences[own.category] = own
             self._committee.join(own)
 
-    def begin(self, category: Category) -> Experience:
-        """An empty memory for a category."""
+    def begin(self, category: Category, y: FloatArray) -> Experience:
+        """An empty memory for a category that is first seen at y (n + len(ξ),)."""
         own = Experience.of(category, self.width)
         prior = self._config.prior
-        inverse, low, high = self.scales.inverse, self.scales.low, self.scales.high
-        scale = np.where(inverse > 0.0, 1.0 / np.where(inverse > 0.0, inverse, 1.0), 1.0)
-        seen = np.isfinite(low)
-        middle = np.zeros(len(low))
-        middle[seen] = (low[seen] + high[seen]) / 2.0
+        low, high = self.scales.low, self.scales.high
+        center = np.where(np.isfinite(low), (low + np.where(np.isfinite(low), high, 0.0)) / 2.0, y)
         for name, basis in (("affine", affine(self.width)), ("quadratic", quadratic(self.width))):
             columns = np.flatnonzero([self._bases[j] == name for j in own.active])
             if len(columns):
                 weights = (prior.weight, prior.slope_weight)
-                own.ridges.append(Ridge.begin(basis, columns, middle, scale, weights))
+                own.ridges.append(Ridge.begin(basis, columns, center, *weights))
         return own
 
     def _forecast(

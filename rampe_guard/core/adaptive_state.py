@@ -49,7 +49,7 @@ def _views(model: Adaptive, own: list[Experience]) -> dict[str, npt.NDArray[np.g
         "drift": _flat([e.drift for e in own]),
         "suspected": np.array([e.suspect is not None for e in own], dtype=np.bool_),
         "suspects": _flat([e.suspect for e in own if e.suspect is not None]),
-        "ridge_scales": _flat([a for r in ridges for a in (r.center, r.width)]),
+        "ridge_centers": _flat([r.center for r in ridges]),
         "ridge_sums": _flat([a for r in ridges for a in (r.precision, r.moment)]),
         "scale_low": scales.low,
         "scale_high": scales.high,
@@ -59,7 +59,9 @@ def _views(model: Adaptive, own: list[Experience]) -> dict[str, npt.NDArray[np.g
         "scale_total": scales.total,
         "scale_largest": scales.largest,
         "spread_sizes": spread.sizes,
-        "spread_squares": spread.squares,
+        "spread_ratios": spread.ratios,
+        "spread_errors": spread.errors,
+        "spread_typical": spread.typical,
         "spread_shape": spread.shape,
         "spread_scale": spread.scale,
         "spread_dof": spread.dof,
@@ -87,7 +89,7 @@ def restore(model: Adaptive, arrays: Arrays) -> Adaptive:
         setattr(scales, name, _like(arrays, f"scale_{name}", mine))
     _check_scales(scales)
     scales.refresh()
-    for name in ("sizes", "squares", "shape", "scale", "dof", "due"):
+    for name in ("sizes", "ratios", "errors", "typical", "shape", "scale", "dof", "due"):
         setattr(spread, name, _counts(arrays, f"spread_{name}", getattr(spread, name)))
     for name in ("mean", "precision"):
         setattr(passing, name, _finite(arrays, f"passing_{name}", getattr(passing, name)))
@@ -115,10 +117,10 @@ def _experiences(model: Adaptive, arrays: Arrays) -> list[Experience]:
     if (per["occurrences"] < per["remembered"]).any():
         raise ValueError("a category remembers more primitives than it has seen")
     names = ("starts", "moves", "trust", "surprise", "drift", "suspects")
-    rolls = {name: _Roll(name, arrays) for name in (*names, "ridge_scales", "ridge_sums")}
+    rolls = {name: _Roll(name, arrays) for name in (*names, "ridge_centers", "ridge_sums")}
     result = []
     for i, signs in enumerate(categories):
-        own = model.begin(tuple(int(s) for s in signs))
+        own = model.begin(tuple(int(s) for s in signs), np.zeros(model.width))
         k, m = int(per["remembered"][i]), len(own.active)
         if m == 0:
             raise ValueError("a category moves no actuator")
@@ -131,13 +133,10 @@ def _experiences(model: Adaptive, arrays: Arrays) -> list[Experience]:
         own.occurrences = int(per["occurrences"][i])
         own.evidence = float(per["evidence"][i])
         for ridge in own.ridges:
-            ridge.center = rolls["ridge_scales"].take(*ridge.center.shape)
-            ridge.width = rolls["ridge_scales"].take(*ridge.width.shape)
+            ridge.center = rolls["ridge_centers"].take(*ridge.center.shape)
             ridge.precision = rolls["ridge_sums"].take(*ridge.precision.shape)
             ridge.moment = rolls["ridge_sums"].take(*ridge.moment.shape)
             _check_moments("ridge_sums", ridge.precision)
-            if (ridge.width <= 0.0).any():
-                raise ValueError("a unit in ridge_scales must be above 0")
         _check_moments("surprise", own.surprise)
         if ((own.trust <= 0.0) | (own.trust > 1.0)).any():
             raise ValueError("trust must lie in (0, 1]")

@@ -124,7 +124,7 @@ class Committee:
             f[radial], v[radial] = deviation[radial], variance
         for ridge in own.ridges:
             at = ridge.columns
-            f[at], v[at], k[at] = ridge.predict(y, usual[at])
+            f[at], v[at], k[at] = ridge.predict(y, self._scales.slope, usual[at])
         return f, v, k
 
     def _fit(self, own: Experience) -> RadialFit:

@@ -97,6 +97,15 @@ class Scales:
         else:
             self._measure_usual()
 
+    @property
+    def slope(self) -> FloatArray:
+        """1 / half of the range seen, of each entry of y (n + len(ξ),); 0 where unknown.
+
+        The unit of functions that have slopes: there it is no matter how much an observation
+        tells, the fit will see.
+        """
+        return 2.0 * self._extra * self.inverse
+
     def refresh(self) -> None:
         """Take up what was restored."""
         self.version += 1

@@ -6,10 +6,10 @@ are standardised by it and by the variance v of the estimate itself,
 
     z = e / sqrt(u (x̂ + ε u) (1 + v)),    u the actuator's usual displacement,
 
-and the sizes |z| of each actuator are counted. Scale and degrees of freedom of the Student-t
-are those that put half of them inside its central 50 % interval and nine tenths inside its
-90 % interval. A category scatters more or less than its actuators do on average: by the ratio
-of its z² to theirs, drawn towards 1 (large z cut off, so that no single one decides).
+and a category's own scatter is the root mean square of its z (large ones cut off), drawn
+towards what is typical of its actuators, for which the median of |z| stands. Of the z divided
+by that, the sizes are counted: scale and degrees of freedom of the Student-t are those that
+put half of them inside its central 50 % interval and nine tenths inside its 90 % interval.
 Products of the z of different actuators give R(Ω) its correlations.
 
 What a symmetric law about the mean cannot say (many displacements are near zero, few are very
@@ -29,7 +29,7 @@ BINS = 10
 """Resolution of the learned shape."""
 _SMALL = 0.1
 """ε: below this share of the usual displacement the spread stops shrinking."""
-_POOL = 12.0
+_POOL = 6.0
 """Errors of a category that its actuators' own spread is worth."""
 _PRIOR_ERRORS = 6.0
 """Errors that the prior spread is worth."""
@@ -37,10 +37,12 @@ _PRIOR_DOF = 4.0
 _MOST_DOF = 60.0
 _FRESH = 1.02
 """Growth of the number of errors after which scale and degrees of freedom are reckoned anew."""
+_SETTLED = 10.0
+"""Errors of an actuator from which their law is learned, and not only their size."""
 _CUT = 6.0
 """z² beyond this many times the category's own counts no more for its spread."""
-_BEGUN = 2.0
-"""Errors that the scale is worth in the mean of z²."""
+_NORMAL = 1.0 / stdtrit(1e9, 0.75)
+"""Standard deviation of a normal law over its median size."""
 _EDGES = np.concatenate(([0.0], np.geomspace(0.005, 50.0, 41), [np.inf]))
 """Borders of the histogram of |z|."""
 _DOF = np.array([1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 30.0, _MOST_DOF])
@@ -62,17 +64,20 @@ class Spread:
 
     Attributes:
         sizes: counts (n, bins) of |z|, with the prior's.
-        squares: sum of the z², cut off, and their number (n, 2).
-        scale: scale of z (n,).
-        dof: degrees of freedom of z (n,).
-        due: number of errors from which both are reckoned anew (n,).
+        ratios: counts (n, bins) of |z| / own scatter, with the prior's.
+        typical: scatter of z that is typical of an actuator (n,).
+        scale: scale of z / own scatter (n,).
+        dof: its degrees of freedom (n,).
+        errors: number of errors (n,).
+        due: number from which the three above are reckoned anew (n,).
         shape: counts (n, 3, BINS) of displacements by class and by where they fell.
     """
 
     def __init__(self, actuators: int, prior: float) -> None:
-        borders = 2.0 * stdtr(_PRIOR_DOF, _EDGES / prior) - 1.0
-        self.sizes: FloatArray = np.tile(_PRIOR_ERRORS * np.diff(borders), (actuators, 1))
-        self.squares: FloatArray = np.zeros((actuators, 2))
+        self.sizes: FloatArray = np.tile(_prior_counts(prior), (actuators, 1))
+        self.ratios: FloatArray = np.tile(_prior_counts(1.0), (actuators, 1))
+        self.errors: FloatArray = np.zeros(actuators)
+        self.typical: FloatArray = np.empty(actuators)
         self.scale: FloatArray = np.empty(actuators)
         self.dof: FloatArray = np.empty(actuators)
         self.due: FloatArray = np.zeros(actuators)
@@ -88,21 +93,18 @@ class Spread:
         self, experience: Experience | None, active: Indices
     ) -> tuple[FloatArray, FloatArray]:
         """Learned scale of z and its degrees of freedom (m,) each."""
-        scale, dof = self.scale[active], self.dof[active]
-        if experience is None:
-            return scale, dof
-        ratio = np.diagonal(experience.surprise) / self._pooled(active)
-        return scale * np.sqrt((_POOL + ratio) / (_POOL + experience.evidence)), dof
+        scatter = self.typical[active] if experience is None else self.deviation(experience)[0]
+        return scatter * self.scale[active], self.dof[active]
 
     def deviation(self, experience: Experience) -> tuple[FloatArray, float]:
-        """Root mean square of z (m,), the large ones cut off, and its degrees of freedom.
+        """A category's own scatter of z (m,), the large ones cut off, and its degrees of freedom.
 
-        The measure for what is no error at all: the tails of `standard` tell what large errors
-        do happen, and with few counted they would let anything pass.
+        Also the measure for what is no error at all: the tails of `standard` tell what large
+        errors do happen, and with few counted they would let anything pass.
         """
-        active = experience.active
         count = _POOL + experience.evidence
-        mean = (_POOL * self._pooled(active) + np.diagonal(experience.surprise)) / count
+        typical = self.typical[experience.active]
+        mean = (_POOL * typical * typical + np.diagonal(experience.surprise)) / count
         return np.sqrt(mean), min(count, _MOST_DOF)
 
     def correlation(self, experience: Experience | None, size: int) -> FloatArray:
@@ -110,20 +112,19 @@ class Spread:
         if experience is None or size == 1:
             return np.eye(size)
         active = experience.active
-        total = experience.surprise + np.diag(_POOL * self._pooled(active))
+        total = experience.surprise + np.diag(_POOL * self.typical[active] ** 2)
         root = np.sqrt(np.diagonal(total))
         result: FloatArray = total / (root[:, None] * root)
         return result
 
     def refresh(self, active: Indices) -> None:
-        """Scale and degrees of freedom from the counted sizes."""
+        """Scatter, scale and degrees of freedom from what was counted."""
         for j in active:
-            cumulated = np.cumsum(self.sizes[j])
-            cumulated /= cumulated[-1]
-            half, most = np.interp((0.5, 0.9), cumulated, _EDGES_IN_USE)
+            self.typical[j] = _NORMAL * _quantiles(self.sizes[j])[0]
+            half, most = _quantiles(self.ratios[j])
             self.dof[j] = np.interp(-most / half, -_TAIL_RATIO, _DOF)
             self.scale[j] = half / stdtrit(self.dof[j], 0.75)
-            self.due[j] = _FRESH * self.squares[j, 1]
+            self.due[j] = _FRESH * self.errors[j]
 
     def shapes(self, active: Indices, mean: FloatArray, usual: FloatArray) -> FloatArray:
         """Cumulated shape (m, BINS + 1) of forecasts of size ``mean`` (m,), from 0 to 1."""
@@ -143,28 +144,40 @@ class Spread:
     ) -> None:
         """Take standardised errors z (m,) that fell at the quantiles ``passed`` (m,)."""
         active = experience.active
-        self.sizes[active, np.searchsorted(_EDGES, np.abs(z), side="right") - 1] += 1.0
-        due = active[self.squares[active, 1] >= self.due[active]]
+        scatter, _ = self.deviation(experience)
+        size = np.abs(z)
+        self.sizes[active, _bins(size)] += 1.0
+        self.errors[active] += 1.0
+        # before the prior's scatter is overcome, errors look smaller or larger than they are
+        settled = self.errors[active] > _SETTLED
+        self.ratios[active, _bins(size / scatter)] += settled
+        due = active[self.errors[active] >= self.due[active]]
         if len(due):
             self.refresh(due)
-        limit = np.sqrt(_CUT) * self.deviation(experience)[0]
-        cut = np.clip(z, -limit, limit)
-        self.squares[active, 0] += cut * cut
-        self.squares[active, 1] += 1.0
+        limit = np.sqrt(_CUT) * scatter
+        cut = np.minimum(np.maximum(z, -limit), limit)
         bins = np.minimum((passed * BINS).astype(np.intp), BINS - 1)
-        self.shape[active, self._classes(mean, usual), bins] += 1.0
+        self.shape[active, self._classes(mean, usual), bins] += settled
         experience.surprise = forgetting * experience.surprise + cut[:, None] * cut
         experience.evidence = forgetting * experience.evidence + 1.0
 
-    def _pooled(self, active: Indices) -> FloatArray:
-        """Mean of z² (m,), cut off, of all categories; begun from the scale that holds now.
-
-        A prior many times too wide would stay in a mean for hundreds of errors, but not in
-        the median that the scale follows.
-        """
-        total, count = self.squares[active].T
-        result: FloatArray = (total + _BEGUN * self.scale[active] ** 2) / (count + _BEGUN)
-        return result
-
     def _classes(self, mean: FloatArray, usual: FloatArray) -> Indices:
         return np.searchsorted(_CLASSES, mean / usual)
+
+
+def _prior_counts(deviation: float) -> FloatArray:
+    """Counts (bins,) of |z| that are believed before any was seen."""
+    scale = deviation * np.sqrt((_PRIOR_DOF - 2.0) / _PRIOR_DOF)
+    result: FloatArray = _PRIOR_ERRORS * np.diff(2.0 * stdtr(_PRIOR_DOF, _EDGES / scale) - 1.0)
+    return result
+
+
+def _bins(size: FloatArray) -> Indices:
+    return np.searchsorted(_EDGES, size, side="right") - 1
+
+
+def _quantiles(counts: FloatArray) -> tuple[float, float]:
+    """Median and 90 % quantile of counted sizes."""
+    cumulated = np.cumsum(counts)
+    half, most = np.interp((0.5, 0.9), cumulated / cumulated[-1], _EDGES_IN_USE)
+    return float(half), float(most)
