@@ -179,10 +179,11 @@ def test_scatter_is_learned_for_each_category_and_actuator() -> None:
     q = np.array([0.0, 3.0, 0.0])
     shown = {c: float(np.sqrt(forecast(model, c, q).covariance.max())) for c in scatter}
     print(shown)
-    # the actuator's own scatter, a mixture of 0.03 and 0.35, draws both towards it
-    assert shown[1, 0, 0] < 0.5 * shown[-1, 0, 0]
-    for category, part in scatter.items():
-        assert 0.33 * part < shown[category] < 3.0 * part
+    assert shown[1, 0, 0] < 0.3 * shown[-1, 0, 0]
+    assert shown[1, 0, 0] < shown[0, 1, 0] < shown[-1, 0, 0]
+    assert 0.7 * 0.35 < shown[-1, 0, 0] < 1.4 * 0.35
+    # the actuator's typical scatter, a mixture of 0.03 and 0.35, draws the careful one upwards
+    assert 0.03 < shown[1, 0, 0] < 2.5 * 0.03
 
 
 @pytest.mark.parametrize("sign", [1, -1])
