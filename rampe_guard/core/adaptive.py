@@ -45,7 +45,7 @@ _ALIKE = 0.25
 _DRIFT_MEMORY = 0.8
 _DRIFT_LIMIT = 7.5
 """Sum of standardised errors, fading, that chance hardly reaches (some 4 standard deviations)."""
-_QUESTIONS = (0.25, 0.5, 1.0, 2.0)
+_QUESTIONS = np.array([0.25, 0.5, 1.0, 2.0])
 """Ways ahead of which it is learned whether they were passed [usual displacements]."""
 _MODE_DOF = 4.0
 _NO_DOF = 4.0
@@ -147,17 +147,24 @@ class Adaptive:
         if not moments or not np.isfinite(usual[active]).all() or not np.isfinite(x).all():
             return
         along = np.array(forecast.category, dtype=np.float64) * x
-        asked: list[FloatArray] = []
-        for moment in moments:
-            lever = moment.under_way
-            for share in _QUESTIONS:
-                distance = moment.progress + share * usual
-                ratio = forecast.passing(distance, moment.progress)
-                passed = (along >= distance).astype(np.float64)
-                rows = (ratio, lever.command, lever.peak, lever.speed, np.arange(self.n), passed)
-                asked.append(np.stack([row[active] for row in rows]))
-        ratio, command, peak, speed, actuator, passed = np.concatenate(asked, axis=1)
-        self.passing.learn(ratio, UnderWay(command, peak, speed), actuator, passed)
+        # (moments, questions, actuators), all at once
+        progress = np.stack([moment.progress for moment in moments])[:, None, :]
+        distance = progress + _QUESTIONS[:, None] * np.nan_to_num(usual)
+        ratio = forecast.passing(distance, progress)
+        shape, chosen = ratio.shape, np.s_[:, :, active]
+
+        def rows(values: FloatArray) -> FloatArray:
+            result: FloatArray = np.broadcast_to(values, shape)[chosen].ravel()
+            return result
+
+        lever = [moment.under_way for moment in moments]
+        under_way = UnderWay(
+            rows(np.stack([u.command for u in lever])[:, None, :]),
+            rows(np.stack([u.peak for u in lever])[:, None, :]),
+            rows(np.stack([u.speed for u in lever])[:, None, :]),
+        )
+        passed = (along >= distance).astype(np.float64)
+        self.passing.learn(rows(ratio), under_way, rows(np.arange(float(self.n))), rows(passed))
 
     def _still_primitive(self, category: Category, y: FloatArray, x: FloatArray) -> Refusal | None:
         self._still += 1

@@ -71,7 +71,7 @@ class DisplacementForecast:
         return self.mean if self.modes is None else self.modes[0]
 
     def survival(self, distance: FloatArray) -> FloatArray:
-        """P(X ≥ distance) (n,) along Ω, for distances (n,) [unit]; 0 where Ω is 0."""
+        """P(X ≥ distance) (..., n) along Ω, for distances (..., n) [unit]; 0 where Ω is 0."""
         sign = np.asarray(self.category, dtype=np.float64)
         distance = np.asarray(distance, dtype=np.float64)
         if self.modes is None:
@@ -103,11 +103,11 @@ class DisplacementForecast:
     def passing(
         self, distance: FloatArray, progress: FloatArray, under_way: UnderWay | None = None
     ) -> FloatArray:
-        """P(X ≥ distance | X ≥ progress, what lever and speed say) (n,), along Ω.
+        """P(X ≥ distance | X ≥ progress, what lever and speed say) (..., n), along Ω.
 
         Args:
-            distance: (n,) from the start along Ω [unit].
-            progress: way already made along Ω (n,) [unit].
+            distance: (..., n) from the start along Ω [unit].
+            progress: way already made along Ω (..., n) [unit].
             under_way: lever and speed now; without it the survival form S(d)/S(p) alone.
         """
         here = np.maximum(self.survival(progress), 0.0)
@@ -139,7 +139,7 @@ class DisplacementForecast:
         bins = self.shape.shape[1] - 1
         at = np.clip(plain, 0.0, 1.0) * bins
         left = np.minimum(at.astype(np.intp), bins - 1)
-        row = np.arange(len(plain))
+        row = np.arange(plain.shape[-1])
         low = self.shape[row, left]
         result: FloatArray = low + (at - left) * (self.shape[row, left + 1] - low)
         return result

@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from rampe_guard.core.adaptive import Adaptive
 from rampe_guard.core.adaptive_state import restore, snapshot
-from rampe_guard.core.basis import Regressor
+from rampe_guard.core.basis import Regressor, affine
 from rampe_guard.core.config import Basis, PriorConfig, RampeConfig
 from rampe_guard.core.displacement import DisplacementForecast
 from rampe_guard.core.faithful import Faithful
@@ -103,6 +103,8 @@ class Rampe:
         self._faithful: Faithful | None = None
         self._adaptive: Adaptive | None = None
         if mode == "faithful":
+            if regressors is None:
+                regressors = [affine(actuators + observations)] * actuators
             self._faithful = Faithful(
                 actuators,
                 regressors=regressors,
@@ -166,7 +168,7 @@ class Rampe:
             mean,
             scale=unknown,
             dof=unknown,
-            occurrences=model.categories[category],
+            occurrences=model.occurrences(category),
             covariance=np.full((self._n, self._n), np.nan) if covariance is None else covariance,
         )
 
