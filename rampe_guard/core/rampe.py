@@ -103,11 +103,9 @@ class Rampe:
         self._faithful: Faithful | None = None
         self._adaptive: Adaptive | None = None
         if mode == "faithful":
-            if regressors is None:
-                regressors = [affine(actuators + observations)] * actuators
             self._faithful = Faithful(
                 actuators,
-                regressors=regressors,
+                regressors=regressors or [affine(actuators + observations)] * actuators,
                 n_init=_N_INIT if n_init is None else n_init,
                 tol=tol,
                 forgetting=1.0 if forgetting is None else forgetting,
