@@ -4,10 +4,13 @@ Data walks one way through it::
 
     samples ─► inputs (gate) ─► joystick (category) ─► primitive (start, end, x)
                                                             │
-                 rls ◄── rampe (memory per category) ◄──────┘
-                              │ predictive distribution
-                              ▼
-    velocity ──────────► forecast (stopping, intent) ─► PathSweeper ─► alarm ─► events
+          rampe ◄── start_observer (ξ), screening ◄─────────┘
+            ├── faithful: rls, basis, noise           the paper to the letter
+            └── adaptive: experience, committee,      the default
+                radial | ridge, spread, modes, passing
+            │ displacement (predictive distribution)
+            ▼
+    velocity ──► forecast (stopping, intent) ─► PathSweeper ─► alarm ─► events
 
 `guard.Guard.step` is the only composer; everything below it can be used alone.
 """

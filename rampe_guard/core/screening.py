@@ -39,6 +39,9 @@ MOST_TAPS = 2
 _AGAINST = 0.1
 """Motion against the lever that lag and load explain [share of the range]."""
 _IMPOSSIBLE = 20.0
+"""Times the largest displacement of an actuator that is well known."""
+_WELL_KNOWN = 25.0
+"""Displacements by which that is so: the first few of an operator may all be taps."""
 _STILL = 1e-9
 _SETTLED_COUNT = 5.0
 """Displacements after which the range worked in is known, where there are no limits."""
@@ -80,8 +83,8 @@ def screen(category: Category, q: FloatArray, x: FloatArray, scales: Scales) -> 
 
 
 def _too_far(driven: npt.NDArray[np.bool_], x: FloatArray, scales: Scales) -> Refusal | None:
-    settled = driven & ~scales.bounded & (scales.count >= _SETTLED_COUNT)
-    return "impossible" if (np.abs(x) > _IMPOSSIBLE * scales.largest)[settled].any() else None
+    known = driven & ~scales.bounded & (scales.count >= _WELL_KNOWN)
+    return "impossible" if (np.abs(x) > _IMPOSSIBLE * scales.largest)[known].any() else None
 
 
 def _span(scales: Scales) -> FloatArray:
