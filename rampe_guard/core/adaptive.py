@@ -68,7 +68,7 @@ class Adaptive:
     ) -> None:
         self.n = actuators
         self.width = actuators + observations
-        self._limits = limits
+        self.limits = limits
         self._config = config
         basis = config.basis
         self._bases = (basis,) * actuators if isinstance(basis, str) else tuple(basis)
@@ -95,7 +95,7 @@ class Adaptive:
 
     def empty(self) -> Adaptive:
         """The same estimator before its first lesson."""
-        return Adaptive(self.n, self._limits, self._config, self.width - self.n)
+        return Adaptive(self.n, self.limits, self._config, self.width - self.n)
 
     def predict(self, category: Category, y: FloatArray) -> DisplacementForecast | None:
         """Blocks 16 and 19: forecast at the start y (n + len(ξ),); None if nothing is known."""
@@ -243,7 +243,7 @@ class Adaptive:
     ) -> DisplacementForecast | None:
         n, q = self.n, y[: self.n]
         sign = np.array(category, dtype=np.float64)
-        room = np.where(sign > 0, self._limits[:, 1] - q, q - self._limits[:, 0])
+        room = np.where(sign > 0, self.limits[:, 1] - q, q - self.limits[:, 0])
         room = np.where(sign != 0.0, np.maximum(room, 0.0), 0.0)
         standard, dof = self.spread.standard(own, active)
         unit = self.spread.unit(estimate.mean, estimate.variance, estimate.usual)

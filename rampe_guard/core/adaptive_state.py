@@ -176,6 +176,7 @@ def _settings(model: Adaptive) -> dict[str, npt.NDArray[np.generic]]:
         "actuators": np.array(model.n),
         "observed": np.array(model.width),
         "basis": np.array(model.basis_codes, dtype=np.int8),
+        "limits": model.limits,
     }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
@@ -86,6 +87,25 @@ class RampeConfig:
     two_futures_from: int = 8
     prior: PriorConfig = field(default_factory=PriorConfig)
     observations: tuple[Observation, ...] = ("q",)
+
+    def __post_init__(self) -> None:
+        """Refuse what no estimator can work with.
+
+        Raises:
+            ValueError: a number is out of its range.
+        """
+        prior = self.prior
+        believed = (prior.displacement, prior.spread, prior.weight, prior.slope_weight)
+        for name, value, fits in (
+            ("n_init", self.n_init, self.n_init >= 0),
+            ("forgetting", self.forgetting, 0.0 < self.forgetting <= 1.0),
+            ("memory", self.memory, self.memory >= 1),
+            ("borrow", self.borrow, 0.0 <= self.borrow < 1.0),
+            ("two_futures_from", self.two_futures_from, self.two_futures_from >= 1),
+            ("prior", believed, all(0.0 < part < math.inf for part in believed)),
+        ):
+            if not fits:
+                raise ValueError(f"{name} is {value}: out of range")
 
 
 @dataclass(frozen=True, slots=True)

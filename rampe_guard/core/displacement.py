@@ -28,8 +28,9 @@ class DisplacementForecast:
 
     Attributes:
         category: Ω.
-        mean: expected x (n,) [unit], never against Ω nor past a limit, 0 where Ω is 0. Where two
-            futures are seen nobody stops there: see `modes` and `likeliest`.
+        mean: expected x (n,) [unit], never against Ω nor past a limit, 0 where Ω is 0 (faithful
+            mode: as the paper has it, without any of these bounds). Where two futures are
+            seen nobody stops there: see `modes` and `likeliest`.
         scale: of the Student-t (n,) [unit], 0 where Ω is 0; nan where no spread is known.
         dof: its degrees of freedom (n,).
         occurrences: primitives of this very category behind it.
@@ -74,6 +75,8 @@ class DisplacementForecast:
         """P(X ≥ distance) (..., n) along Ω, for distances (..., n) [unit]; 0 where Ω is 0."""
         sign = np.asarray(self.category, dtype=np.float64)
         distance = np.asarray(distance, dtype=np.float64)
+        if distance.shape[-1:] != sign.shape or np.isnan(distance).any():
+            raise ValueError(f"distance {distance} must be {len(sign)} numbers")
         if self.modes is None:
             result = 1.0 - self._shaped(_cdf(distance, sign * self.mean, self.scale, self.dof))
         else:
@@ -90,6 +93,8 @@ class DisplacementForecast:
 
         It does not lead against Ω nor past a limit: there the distribution ends.
         """
+        if not (np.min(p) >= 0.0 and np.max(p) <= 1.0):
+            raise ValueError(f"a quantile of probability {p} cannot be")
         sign = np.asarray(self.category, dtype=np.float64)
         level = np.clip(np.broadcast_to(np.asarray(p, dtype=np.float64), sign.shape), *_LEVELS)
         if self.modes is None:
@@ -113,7 +118,7 @@ class DisplacementForecast:
         here = np.maximum(self.survival(progress), 0.0)
         there = self.survival(distance)
         ratio = np.where(here > _LEAST_SURVIVAL, there / np.maximum(here, _LEAST_SURVIVAL), 0.0)
-        ratio = np.clip(ratio, 0.0, 1.0)
+        ratio = np.where(np.isnan(there), np.nan, np.clip(ratio, 0.0, 1.0))
         if under_way is not None and self.weights is not None:
             ratio = condition(ratio, self.weights, under_way)
         return np.where(np.asarray(distance) <= progress, 1.0, ratio)
@@ -174,4 +179,5 @@ def _cdf(distance: FloatArray, mean: FloatArray, scale: FloatArray, dof: FloatAr
     result: FloatArray = np.where(
         scale > 0.0, stdtr(dof, (distance - mean) / spread), (distance >= mean).astype(float)
     )
-    return result
+    # an unknown spread is no certainty
+    return np.where(np.isnan(scale), np.nan, result)

@@ -19,6 +19,7 @@ from rampe_guard.core.events import (
     AlertEvent,
     Event,
     Evidence,
+    PredictionEvent,
     PredictionSummary,
     RefusalEvent,
     Source,
@@ -108,7 +109,7 @@ class Guard:
         events: list[Event] = []
         before = self._newest
         for sample in _in_stamp_order(inputs):
-            events += self._take(sample, now_s)
+            events += self._taught(self._take(sample, now_s))
         health = self._monitor.health(now_s)
         moment = self._moment(health, now_s)
         events += self._annunciator.system(_system_evidence(health), moment)
@@ -161,6 +162,12 @@ class Guard:
         self._velocity.update(moved.sample)
         v = self._velocity.velocity
         return [*self._intention.actuators(moved.sample, v, now_s, learn=learn)]
+
+    def _taught(self, events: list[Event]) -> list[Event]:
+        for event in events:
+            if isinstance(event, PredictionEvent) and event.event == "ended":
+                self._monitor.lesson(event.refusal)
+        return events
 
     def _refuse(self, name: InputName, reason: str, now_s: float) -> None:
         self._monitor.reject(name, reason, now_s)

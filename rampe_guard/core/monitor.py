@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from rampe_guard.core.config import InputConfig
+from rampe_guard.core.screening import FAULTS
 from rampe_guard.core.types import InputName
 
 _RECENT_S = 5.0
@@ -19,6 +20,8 @@ _RECENT_S = 5.0
 _PLAUSIBLE_WINDOW_S = 10.0
 _IMPLAUSIBLE_SHARE = 0.1
 """More refused samples than this share is not a glitch: wrong columns, scale or sensor."""
+_FAULTY_RUN = 3
+"""Refused primitives in a row that are no chance."""
 _ENOUGH_SAMPLES = 20
 
 
@@ -73,6 +76,7 @@ class InputMonitor:
         self._bad = 0
         self._unknown_s: float | None = None
         self._joystick_alive: bool | None = None
+        self._faulty: list[str] = []
 
     def accept(self, name: InputName, arrival_s: float) -> None:
         """A good sample arrived."""
@@ -89,6 +93,13 @@ class InputMonitor:
     def sweep_unknown(self, now_s: float) -> None:
         """A sweep ended without an answer."""
         self._unknown_s = now_s
+
+    def lesson(self, refusal: str | None) -> None:
+        """A primitive was learned, or refused for a reason (see `core.screening`)."""
+        if refusal is None:
+            self._faulty.clear()
+        elif refusal in FAULTS:
+            self._faulty.append(refusal)
 
     def joystick_alive(self, alive: bool | None) -> None:
         """What the joystick's liveliness token says; None without a token."""
@@ -156,6 +167,12 @@ class InputMonitor:
         if not self.plausible(now_s):
             text = "many messages refused: columns, scale or sensor wrong? Nothing is learned now"
             found.append(Reason("implausible", None, text))
+        if len(self._faulty) >= _FAULTY_RUN:
+            words = ", ".join(sorted(set(self._faulty)))
+            text = (
+                f"the last primitives cannot be what they seem ({words}): wrong column or sensor?"
+            )
+            found.append(Reason("primitives_refused", "actuators", text))
         if self._unknown_s is not None and now_s - self._unknown_s <= _RECENT_S:
             text = "a sweep ran out of its budget and was taken as contact"
             found.append(Reason("sweep_unknown", None, text))

@@ -33,6 +33,8 @@ __all__ = ["CategoryRow", "DisplacementForecast", "Rampe"]
 _N_INIT = 3
 """Of the paper's test."""
 _SIGNS = frozenset((-1, 0, 1))
+_LARGEST = 1e50
+"""Limits beyond are none: the squares of what lies between must stay finite."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +64,8 @@ class Rampe:
             0, a category never seen borrows from related ones).
         tol: relative threshold of the pseudo-inverse (faithful).
         forgetting: λ in (0, 1] (faithful: 1; bayesian: 0.98).
-        limits: (n, 2) [unit], scale q and bound predictions; None or infinite without.
+        limits: (n, 2) [unit], scale q and bound predictions; None or infinite without
+            (bayesian).
         prior: what is believed before the first occurrence (bayesian).
         basis: "affine", "quadratic" or "radial", or one for each actuator (bayesian).
         config: all settings of the bayesian mode at once, instead of those above.
@@ -90,16 +93,12 @@ class Rampe:
         regressors: Sequence[Regressor] | None = None,
         noise: FloatArray | Mapping[Category, FloatArray] | Literal["learned"] | None = None,
     ) -> None:
+        if actuators < 1 or observations < 0:
+            raise ValueError(f"{actuators} actuators and {observations} observations cannot be")
         self._n = actuators
         self._observations = observations
-        self._mode = mode
-        bounds = np.tile([-np.inf, np.inf], (actuators, 1))
-        if limits is not None:
-            bounds = np.asarray(limits, dtype=np.float64)
-        if bounds.shape != (actuators, 2):
-            raise ValueError(f"limits have shape {bounds.shape}, need ({actuators}, 2)")
-        if forgetting is not None and not 0.0 < forgetting <= 1.0:
-            raise ValueError(f"forgetting is {forgetting}, must lie in (0, 1]")
+        bayesian = {"limits": limits, "prior": prior, "basis": basis, "config": config}
+        _only("faithful" if mode == "bayesian" else "bayesian", mode, bayesian, regressors, noise)
         self._faithful: Faithful | None = None
         self._adaptive: Adaptive | None = None
         if mode == "faithful":
@@ -123,7 +122,7 @@ class Rampe:
                 settings = replace(
                     settings, basis=basis if isinstance(basis, str) else tuple(basis)
                 )
-            self._adaptive = Adaptive(actuators, bounds, settings, observations)
+            self._adaptive = Adaptive(actuators, _bounds(actuators, limits), settings, observations)
         else:
             raise ValueError(f"mode is {mode!r}, must be 'bayesian' or 'faithful'")
 
@@ -152,7 +151,7 @@ class Rampe:
         Raises:
             ValueError: a wrong length, or Ω is no category of these actuators.
         """
-        y = self._observation(category, q, xi)
+        category, y = self._observation(category, q, xi)
         if self._adaptive is not None:
             return self._adaptive.predict(category, y)
         model = self._model
@@ -182,7 +181,7 @@ class Rampe:
             ValueError: a wrong length, or Ω is no category of these actuators; faithful: a
                 value is not finite. Nothing is learned.
         """
-        y = self._observation(category, q, xi)
+        category, y = self._observation(category, q, xi)
         moved = np.asarray(x, dtype=np.float64)
         if moved.shape != (self._n,):
             raise ValueError(f"x has shape {moved.shape}, need ({self._n},)")
@@ -239,15 +238,44 @@ class Rampe:
             raise AssertionError("one of the two modes is always there")
         return self._faithful
 
-    def _observation(self, category: Category, q: npt.ArrayLike, xi: npt.ArrayLike) -> FloatArray:
-        """The vector y = [q, ξ], checked."""
+    def _observation(
+        self, category: Category, q: npt.ArrayLike, xi: npt.ArrayLike
+    ) -> tuple[Category, FloatArray]:
+        """Ω as a tuple and the vector y = [q, ξ], checked."""
         y = np.concatenate((np.asarray(q, dtype=np.float64), np.asarray(xi, dtype=np.float64)))
         if len(y) != self._n + self._observations:
             raise ValueError(
                 f"q and ξ have {len(y)} values together, need {self._n} + {self._observations}"
             )
-        if len(category) != self._n or not any(category) or not _SIGNS.issuperset(category):
-            raise ValueError(
-                f"category {category} is not {self._n} signs -1, 0, 1, one of them not 0"
-            )
-        return y
+        signs = tuple(category)
+        if len(signs) != self._n or not any(signs) or not _SIGNS.issuperset(signs):
+            raise ValueError(f"category {signs} is not {self._n} signs -1, 0, 1, one of them not 0")
+        return tuple(map(int, signs)), y
+
+
+def _bounds(actuators: int, limits: npt.ArrayLike | None) -> FloatArray:
+    """Limits (n, 2), infinite where there are none."""
+    if limits is None:
+        return np.tile([-np.inf, np.inf], (actuators, 1))
+    bounds = np.asarray(limits, dtype=np.float64)
+    if bounds.shape != (actuators, 2):
+        raise ValueError(f"limits have shape {bounds.shape}, need ({actuators}, 2)")
+    sized = np.where(np.isfinite(bounds), bounds, np.array([-_LARGEST, _LARGEST]))
+    turned = bounds[:, 0] < bounds[:, 1]  # False for NaN
+    if not (turned & (np.abs(sized) <= _LARGEST).all(axis=1)).all():
+        raise ValueError(f"limits are {bounds.tolist()}, need lower < upper, within {_LARGEST:g}")
+    return bounds
+
+
+def _only(
+    other: str,
+    mode: str,
+    bayesian: Mapping[str, object],
+    regressors: object,
+    noise: object,
+) -> None:
+    """Refuse a setting that the chosen mode does not have, rather than ignore it."""
+    foreign = {"regressors": regressors, "noise": noise} if mode == "bayesian" else bayesian
+    given = [name for name, value in foreign.items() if value is not None and name != "limits"]
+    if given:
+        raise ValueError(f"{', '.join(given)}: only in mode {other!r}, this is {mode!r}")

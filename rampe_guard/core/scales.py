@@ -8,6 +8,7 @@ worked in, displacements in shares of the actuator's usual displacement.
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from rampe_guard.core.types import FloatArray, Indices
 
@@ -96,6 +97,11 @@ class Scales:
             self.usual[active] = self.total[active] / self.count[active]
         else:
             self._measure_usual()
+
+    @property
+    def known(self) -> npt.NDArray[np.bool_]:
+        """Which actuators have a usual displacement (n,)."""
+        return ~np.isnan(self.usual)
 
     @property
     def slope(self) -> FloatArray:

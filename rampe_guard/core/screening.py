@@ -17,7 +17,7 @@ until something moves again.
 
 from __future__ import annotations
 
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -34,17 +34,23 @@ Refusal: TypeAlias = Literal[
     "impossible",
     "outlier",
 ]
+FAULTS: frozenset[str] = frozenset(get_args(Refusal)) - {"outlier"}
+"""Refusals that speak of a wrong column or a faulty sensor."""
 MOST_TAPS = 2
 """Primitives without motion in a row that may be taps; more is a frozen sensor."""
-_AGAINST = 0.1
-"""Motion against the lever that lag and load explain [share of the range]."""
+_AGAINST = 0.5
+"""Motion against the lever, or without it, that lag and load explain [usual displacements]."""
+_HARDLY = 0.1
+"""Motion with the lever that is hardly any [usual displacements]."""
+_LARGEST = 1e100
+"""Values beyond are no measurements: their squares must stay finite."""
 _IMPOSSIBLE = 20.0
 """Times the largest displacement of an actuator that is well known."""
 _WELL_KNOWN = 25.0
 """Displacements by which that is so: the first few of an operator may all be taps."""
 _STILL = 1e-9
-_SETTLED_COUNT = 5.0
-"""Displacements after which the range worked in is known, where there are no limits."""
+_UNKNOWN = 1e-9
+"""Usual displacement of an actuator that was never seen to move."""
 
 
 def is_still(x: FloatArray, scales: Scales) -> bool:
@@ -66,18 +72,20 @@ def screen(category: Category, q: FloatArray, x: FloatArray, scales: Scales) -> 
         scales: learned units.
     """
     end = q + x
-    if not np.isfinite(end).all():  # neither could be NaN or infinite without the sum being so
+    # neither could be NaN or infinite without the sum being so
+    if not (np.abs(end) < _LARGEST).all() or not (np.abs(x) < _LARGEST).all():
         return "not_finite"
     lowest, highest = np.minimum(q, end), np.maximum(q, end)
     if (lowest < scales.lowest).any() or (highest > scales.highest).any():
         return "outside_limits"
     sign = np.array(category, dtype=np.float64)
-    moved = x / _span(scales)
+    driven = sign != 0.0
+    # where nothing is known of an actuator, any motion against its lever is too much
+    moved = x / np.where(np.isnan(scales.usual), _UNKNOWN, scales.usual)
     if (sign * moved < -_AGAINST).any():
         return "against_lever"
-    driven = sign != 0.0
     share = np.abs(moved)
-    if share[~driven].sum() > max(share[driven].sum(), _AGAINST):
+    if share[driven].max() < _HARDLY and (share[~driven & scales.known] > _AGAINST).any():
         return "wrong_actuator"
     return None if scales.all_bounded else _too_far(driven, x, scales)
 
@@ -85,12 +93,3 @@ def screen(category: Category, q: FloatArray, x: FloatArray, scales: Scales) -> 
 def _too_far(driven: npt.NDArray[np.bool_], x: FloatArray, scales: Scales) -> Refusal | None:
     known = driven & ~scales.bounded & (scales.count >= _WELL_KNOWN)
     return "impossible" if (np.abs(x) > _IMPOSSIBLE * scales.largest)[known].any() else None
-
-
-def _span(scales: Scales) -> FloatArray:
-    """Range per actuator [unit]: by its limits, else as worked in; infinite while unknown."""
-    if scales.all_bounded:
-        return scales.span
-    worked = (scales.high - scales.low)[: len(scales.span)]
-    settled = (scales.count >= _SETTLED_COUNT) & (worked > 0.0)
-    return np.where(scales.bounded, scales.span, np.where(settled, worked, np.inf))

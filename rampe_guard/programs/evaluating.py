@@ -18,6 +18,7 @@ from rampe_guard.evaluate.prediction_plot import draw
 from rampe_guard.evaluate.prediction_report import report
 from rampe_guard.evaluate.prediction_score import KNOWN, Error
 from rampe_guard.evaluate.segments import cut
+from rampe_guard.programs.output import output_folder
 from rampe_guard.runtime.csv_log import read_csv_log
 from rampe_guard.settings import Site, load_site
 
@@ -39,8 +40,8 @@ def evaluate(
         for warning in log.warnings:
             print(f"warning: {warning}", file=sys.stderr)  # noqa: T201
         runs.append(cut(site.guard, limits, log))
+    output_folder(out)  # before the work, and not after it
     prediction = assess(site.guard, limits, runs, fresh=fresh)
-    out.mkdir(parents=True, exist_ok=True)
     content = json.dumps(report(prediction, site), indent=2, allow_nan=False)
     (out / "prediction.json").write_text(content + "\n", encoding="utf-8")
     draw(prediction, site.actuator_names, _title(site, prediction), out / "prediction.png")

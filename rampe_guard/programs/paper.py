@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -25,6 +24,7 @@ from rampe_guard.evaluate.paper_report import (
     primitives_csv,
     report_json,
 )
+from rampe_guard.programs.output import output_folder
 from rampe_guard.simulate.paper_arm import ACTUATORS, LIMITS, TARGETS, WAY, Recording, paper_run
 
 
@@ -41,7 +41,7 @@ def paper(out: str, seeds: int, cycles: int, first_seed: int, console: Console) 
     Raises:
         RampeGuardError: ``out`` cannot be written to.
     """
-    folder = _folder(out)
+    folder = output_folder(out)
     shown: Recording | None = None
     runs: list[Run] = []
     minutes, corrections = 0.0, 0
@@ -59,17 +59,6 @@ def paper(out: str, seeds: int, cycles: int, first_seed: int, console: Console) 
     console.print(_summary(report))
     console.print(Text(f"\npage: {folder / 'index.html'}", no_wrap=True, overflow="ignore"))
     return 0
-
-
-def _folder(out: str) -> Path:
-    folder = Path(out)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RampeGuardError(f"cannot make the folder {out}: {error.strerror}") from error
-    if not os.access(folder, os.W_OK):  # now, and not after minutes of work
-        raise RampeGuardError(f"cannot write into the folder {out}; choose another with --out")
-    return folder
 
 
 def _judged(recording: Recording) -> Run:

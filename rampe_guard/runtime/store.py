@@ -56,7 +56,8 @@ def safe_name(name: str) -> str:
     if _PLAIN.fullmatch(name):
         return name
     digest = hashlib.sha256(name.encode("utf-8", "surrogatepass")).hexdigest()[:16]
-    return f"{re.sub(r'[^a-z0-9_-]+', '-', name.lower())[:40]}~{digest}"
+    plain = re.sub(r"[^a-z0-9_-]+", "-", name.lower()).strip("-")[:40]
+    return f"{plain}~{digest}"
 
 
 def _state_directory(site: Site) -> Path:

@@ -31,7 +31,9 @@ class Endpoint(Message, frozen=True, kw_only=True):
     """One of two futures."""
 
     position: Annotated[f.ByActuator, Meta(description="End position by actuator [rad or m].")]
-    share: f.Probability
+    share: Annotated[
+        float, Meta(ge=0.0, le=1.0, description="Share of the occurrences that ended there.")
+    ]
 
 
 class Prediction(Message, frozen=True, kw_only=True):

@@ -87,7 +87,8 @@ def test_any_site_file_is_a_site_or_a_settings_error(folder: Path, content: byte
     path.write_bytes(content)
     site, refusal = attempt(lambda: load_site(path))
     for line in refusal:
-        assert line.startswith(str(path))
+        # a name that changed in the site may be missed in the scene: that file is named then
+        assert line.startswith((str(path), str(path.with_name("scene.yaml"))))
         assert line.isprintable()
         assert len(line) < 1000
     if site is not None:

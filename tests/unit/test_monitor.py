@@ -112,3 +112,15 @@ def test_before_the_first_data_nothing_is_monitored_but_no_fault_is_told_yet() -
     assert not monitor.health(0.6).starting
     monitor.accept("joystick", 0.1)
     assert not monitor.health(0.2).starting
+
+
+def test_primitives_that_cannot_be_degrade_until_one_can() -> None:
+    monitor = fed()
+    for refusal in ("wrong_actuator", "outlier", "incomplete", "wrong_actuator"):
+        monitor.lesson(refusal)
+    assert codes(monitor, 1.1) == []
+    monitor.lesson("no_motion")
+    assert codes(monitor, 1.1) == ["primitives_refused"]
+    assert "no_motion, wrong_actuator" in monitor.health(1.1).reasons[0].text
+    monitor.lesson(None)
+    assert codes(monitor, 1.1) == []
