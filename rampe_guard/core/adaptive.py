@@ -195,8 +195,6 @@ class Adaptive:
         """Learn from how wrong the forecast was; refuse a first outlier."""
         unit = self.spread.unit(estimate.mean, estimate.variance, estimate.usual)
         z = (move - estimate.mean) / unit
-        standard, dof = self.spread.standard(own, own.active)
-        passed = np.asarray(stdtr(dof, z / standard), dtype=np.float64)
         deviation, count = self.spread.deviation(own)
         if 2.0 * stdtr(count, -np.abs(z) / deviation).min() < _OUTLIER / len(z):
             before, own.suspect = own.suspect, move
@@ -208,7 +206,9 @@ class Adaptive:
             own.distrust()  # the suspect stays: a third one like it is not held up again
             return None  # a new habit; its distance from the old one is no spread
         own.suspect = None
-        self.spread.learn(own, z, passed, estimate.mean, estimate.usual, self._config.forgetting)
+        self.spread.learn(
+            own, z, deviation, estimate.mean / estimate.usual, self._config.forgetting
+        )
         own.drift = _DRIFT_MEMORY * own.drift + z / deviation
         if np.abs(own.drift).max() > _DRIFT_LIMIT:
             own.distrust()

@@ -128,7 +128,7 @@ class Spread:
 
     def shapes(self, active: Indices, mean: FloatArray, usual: FloatArray) -> FloatArray:
         """Cumulated shape (m, BINS + 1) of forecasts of size ``mean`` (m,), from 0 to 1."""
-        counts = self.shape[active, self._classes(mean, usual)]
+        counts = self.shape[active, np.searchsorted(_CLASSES, mean / usual)]
         cumulated = np.zeros((len(mean), BINS + 1))
         np.cumsum(counts, axis=1, out=cumulated[:, 1:])
         return cumulated / cumulated[:, -1:]
@@ -137,32 +137,38 @@ class Spread:
         self,
         experience: Experience,
         z: FloatArray,
-        passed: FloatArray,
-        mean: FloatArray,
-        usual: FloatArray,
+        scatter: FloatArray,
+        length: FloatArray,
         forgetting: float,
     ) -> None:
-        """Take standardised errors z (m,) that fell at the quantiles ``passed`` (m,)."""
+        """Take standardised errors z (m,) of a category.
+
+        Args:
+            experience: its memory.
+            z: errors, standardised by `unit`.
+            scatter: the category's own (`deviation`) before this one (m,).
+            length: of the forecasts (m,) [usual displacements].
+            forgetting: λ.
+        """
         active = experience.active
-        scatter, _ = self.deviation(experience)
+        ratio = z / scatter
+        # where they fell in what was forecast
+        passed = stdtr(self.dof[active], ratio / self.scale[active])
         size = np.abs(z)
         self.sizes[active, _bins(size)] += 1.0
         self.errors[active] += 1.0
         # before the prior's scatter is overcome, errors look smaller or larger than they are
         settled = self.errors[active] > _SETTLED
-        self.ratios[active, _bins(size / scatter)] += settled
+        self.ratios[active, _bins(np.abs(ratio))] += settled
         due = active[self.errors[active] >= self.due[active]]
         if len(due):
             self.refresh(due)
         limit = np.sqrt(_CUT) * scatter
         cut = np.minimum(np.maximum(z, -limit), limit)
         bins = np.minimum((passed * BINS).astype(np.intp), BINS - 1)
-        self.shape[active, self._classes(mean, usual), bins] += settled
+        self.shape[active, np.searchsorted(_CLASSES, length), bins] += settled
         experience.surprise = forgetting * experience.surprise + cut[:, None] * cut
         experience.evidence = forgetting * experience.evidence + 1.0
-
-    def _classes(self, mean: FloatArray, usual: FloatArray) -> Indices:
-        return np.searchsorted(_CLASSES, mean / usual)
 
 
 def _prior_counts(deviation: float) -> FloatArray:
