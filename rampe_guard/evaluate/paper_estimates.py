@@ -8,7 +8,7 @@ the paper's test.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, Protocol, TypeAlias
 
 import numpy as np
@@ -32,11 +32,15 @@ MODES: tuple[PredictorName, ...] = ("faithful", "default")
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One run: its primitives, and x̂ (K, n) [unit] of every predictor."""
+    """One run: its primitives, and x̂ (K, n) [unit] of every predictor.
+
+    ``two_futures`` marks the forecasts (K,) in which the default mode saw two ends, not one.
+    """
 
     seed: int
     primitives: Primitives
     estimate: dict[PredictorName, FloatArray]
+    two_futures: npt.NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     def error(self, predictor: PredictorName) -> FloatArray:
         """E = x - x̂ (K, n) [unit]."""
@@ -62,12 +66,14 @@ def judge(seed: int, primitives: Primitives, limits: FloatArray) -> Run:
         limits: end stops (n, 2) [unit], which the default mode knows.
     """
     n = limits.shape[0]
+    default = _ByRampe(Rampe(n, limits=limits), n)
     made: dict[PredictorName, _Predictor] = {
         "faithful": _ByRampe(Rampe(n, mode="faithful", n_init=N_INIT, tol=TOL), n),
-        "default": _ByRampe(Rampe(n, limits=limits), n),
+        "default": default,
         "running mean": _RunningMean(n),
     }
-    return Run(seed, primitives, {name: _ask(p, primitives) for name, p in made.items()})
+    estimate = {name: _ask(p, primitives) for name, p in made.items()}
+    return Run(seed, primitives, estimate, np.array(default.two_futures, dtype=bool))
 
 
 def _ask(predictor: _Predictor, primitives: Primitives) -> FloatArray:
@@ -85,9 +91,11 @@ class _ByRampe:
     def __init__(self, model: Rampe, n: int) -> None:
         self._model = model
         self._n = n
+        self.two_futures: list[bool] = []
 
     def estimate(self, category: Category, q: FloatArray) -> FloatArray:
         forecast = self._model.predict(category, q)
+        self.two_futures.append(forecast is not None and forecast.bimodal)
         return np.zeros(self._n) if forecast is None else forecast.mean
 
     def learn(self, category: Category, q: FloatArray, x: FloatArray) -> None:

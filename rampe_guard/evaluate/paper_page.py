@@ -130,6 +130,11 @@ def _limits(report: Report) -> Iterable[str]:
         " place. Position and category cannot tell these apart (the tangent paths of Fig. 2).</li>"
         for category, count in report.two_ways.items()
     ]
+    lines += [
+        f"<li>The default said of {sign_name(category)} that it has two futures, and not one, in"
+        f" {said} of {total} forecasts.</li>"
+        for category, (said, total) in report.two_futures.items()
+    ]
     yield "<ul>" + "".join(lines or ["<li>Nothing to show.</li>"]) + "</ul>"
 
 

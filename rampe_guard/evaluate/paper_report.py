@@ -71,6 +71,7 @@ class Report:
         claims: per mode.
         squared: share of the squared error that each category bears, per mode, largest first.
         two_ways: runs in which a category goes two ways from one place, categories that do.
+        two_futures: forecasts in which the default mode said so, and all of the category.
     """
 
     experiment: Experiment
@@ -83,6 +84,7 @@ class Report:
     claims: dict[PredictorName, tuple[Claim, ...]]
     squared: dict[PredictorName, dict[Category, float]]
     two_ways: dict[Category, int]
+    two_futures: dict[Category, tuple[int, int]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +110,7 @@ def build_report(experiment: Experiment, runs: Sequence[Run]) -> Report:
         claims={mode: claims(runs, mode, span) for mode in MODES},
         squared={mode: squared_shares(runs, mode, span) for mode in MODES},
         two_ways=_two_ways(runs, span),
+        two_futures=_two_futures(runs),
     )
 
 
@@ -143,6 +146,10 @@ def report_json(report: Report) -> dict[str, Any]:
             mode: {sign_name(c): value for c, value in shares.items()}
             for mode, shares in report.squared.items()
         },
+        "forecasts_of_two_futures": {
+            sign_name(c): {"said": said, "of": total}
+            for c, (said, total) in report.two_futures.items()
+        },
         "runs_with_two_ways_from_one_place": {
             sign_name(c): count for c, count in report.two_ways.items()
         },
@@ -171,6 +178,16 @@ def primitives_csv(runs: Sequence[Run], experiment: Experiment) -> str:
             row = [run.seed, *times, *category, int(p.occurrence[k])]
             table.writerow([*row, *(f"{value:.9g}" for value in numbers)])
     return text.getvalue()
+
+
+def _two_futures(runs: Sequence[Run]) -> dict[Category, tuple[int, int]]:
+    """Categories for which two futures were ever forecast: how often, and of how many."""
+    said, total = Counter[Category](), Counter[Category]()
+    for run in runs:
+        for category, two in zip(run.primitives.category, run.two_futures, strict=False):
+            total[category] += 1
+            said[category] += bool(two)
+    return {c: (count, total[c]) for c, count in said.most_common() if count}
 
 
 def _two_ways(runs: Sequence[Run], span: FloatArray) -> dict[Category, int]:
