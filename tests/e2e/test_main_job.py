@@ -90,7 +90,8 @@ def test_heartbeat_beats_and_state_tells_the_late_joiner(live: Station) -> None:
     assert state["heartbeat"]["boot_id"] == newest["boot_id"]
     assert "crate" in {a["zone"] for a in state["alerts"]}
     assert state["predictions"][0]["category"] == [-1, 0, 0, 0]
-    assert state["position"]["swing"] == pytest.approx(live.rig.position[0], abs=1e-6)
+    # the arm may still creep while the question is on its way: a few samples of travel
+    assert state["position"]["swing"] == pytest.approx(live.rig.position[0], abs=0.05)
     alive = f"{live.site.keys.base}/alive"
     assert live.ears.tokens(alive) == [alive]
     live.calm()
