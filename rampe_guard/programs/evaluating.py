@@ -40,8 +40,8 @@ def evaluate(
         for warning in log.warnings:
             print(f"warning: {warning}", file=sys.stderr)  # noqa: T201
         runs.append(cut(site.guard, limits, log))
-    output_folder(out)  # before the work, and not after it
     prediction = assess(site.guard, limits, runs, fresh=fresh)
+    output_folder(out)
     content = json.dumps(report(prediction, site), indent=2, allow_nan=False)
     (out / "prediction.json").write_text(content + "\n", encoding="utf-8")
     draw(prediction, site.actuator_names, _title(site, prediction), out / "prediction.png")
