@@ -212,7 +212,7 @@ def test_damaged_arrays_are_refused_and_change_nothing(
     # only a value that could be true comes through: one that changes sign, or has no bound
     assert (how, name) in {
         *(("minus", n) for n in ("starts", "moves", "drift", "surprise", "suspects")),
-        *(("minus", n) for n in ("ridge_scales", "ridge_sums", "passing_mean", "scale_low")),
+        *(("minus", n) for n in ("ridge_centers", "ridge_sums", "passing_mean", "scale_low")),
     }, f"{name} {how} was taken"
     for category, q, _, _ in steps(4, 10):
         p = other.predict(category, q)
