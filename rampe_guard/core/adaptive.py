@@ -78,15 +78,18 @@ class Adaptive:
         self.scales = Scales(limits, prior.displacement, observations)
         self.spread = Spread(actuators, prior.spread)
         self.passing = PassingModel(actuators)
-        self.experiences: dict[Category, Experience] = {}
         self.refused: Counter[str] = Counter()
-        radial = np.array([basis == "radial" for basis in self._bases], dtype=np.float64)
-        self._committee = Committee(config, self.scales, radial)
+        self._committee = Committee(config, self.scales)
         self._taps: list[tuple[Category, FloatArray, FloatArray]] = []
         self._plain = np.tile(np.linspace(0.0, 1.0, BINS + 1), (actuators, 1))
         self._still = 0
         self._lessons = 0
         self._latest: tuple[Category, FloatArray, int, Estimate] | None = None
+
+    @property
+    def experiences(self) -> dict[Category, Experience]:
+        """All categories seen."""
+        return self._committee.experiences
 
     @property
     def basis_codes(self) -> tuple[int, ...]:
@@ -217,7 +220,6 @@ class Adaptive:
     def add(self, own: Experience) -> None:
         """Make a category known."""
         if own.category not in self.experiences:
-            self.experiences[own.category] = own
             self._committee.join(own)
 
     def begin(self, category: Category, y: FloatArray) -> Experience:

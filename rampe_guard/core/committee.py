@@ -54,20 +54,16 @@ class Committee:
     Args:
         config: the estimator's settings.
         scales: learned units.
-        radial: which actuators have the radial basis (n,).
+
+    Attributes:
+        experiences: all categories seen.
     """
 
-    def __init__(
-        self,
-        config: RampeConfig,
-        scales: Scales,
-        radial: FloatArray,
-    ) -> None:
+    def __init__(self, config: RampeConfig, scales: Scales) -> None:
         self._borrow = config.borrow
         self._kernel = RadialKernel(1.0 / config.prior.weight)
         self._scales = scales
-        self._experiences: dict[Category, Experience] = {}
-        self._radial = radial
+        self.experiences: dict[Category, Experience] = {}
         self._fits: dict[Category, RadialFit] = {}
         self._neighbours: dict[Category, list[_Neighbour]] = {}
 
@@ -79,7 +75,7 @@ class Committee:
             back = _Neighbour(own, neighbour.there, neighbour.here)
             self._neighbours[other.category].append(back)
         self._neighbours[own.category] = found
-        self._experiences[own.category] = own
+        self.experiences[own.category] = own
 
     def estimate(
         self, category: Category, active: Indices, own: Experience | None, y: FloatArray
@@ -112,16 +108,9 @@ class Committee:
         """Deviation from usual, variance and prior variance (m,) by one category alone."""
         usual = self._scales.usual[own.active]
         k: FloatArray = np.full(len(usual), self._kernel.variance)
-        if not own.ridges:
-            f, variance = self._kernel.predict(self._fit(own), y * self._scales.inverse, usual)
-            return f, np.full(len(usual), variance), k
         f, v = np.zeros(len(usual)), k.copy()
-        radial = self._radial[own.active] > 0.0
-        if radial.any():
-            deviation, variance = self._kernel.predict(
-                self._fit(own), y * self._scales.inverse, usual
-            )
-            f[radial], v[radial] = deviation[radial], variance
+        if sum(len(ridge.columns) for ridge in own.ridges) < len(usual):
+            f, v[:] = self._kernel.predict(self._fit(own), y * self._scales.inverse, usual)
         for ridge in own.ridges:
             at = ridge.columns
             f[at], v[at], k[at] = ridge.predict(y, self._scales.slope, usual[at])
@@ -152,7 +141,7 @@ class Committee:
             for other in (-1, 0, 1):
                 if other == sign:
                     continue
-                known = self._experiences.get((*category[:j], other, *category[j + 1 :]))
+                known = self.experiences.get((*category[:j], other, *category[j + 1 :]))
                 if known is not None:
                     here = np.flatnonzero(np.array(known.category)[active] == signs[active])
                     there = np.searchsorted(known.active, active[here])

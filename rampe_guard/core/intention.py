@@ -177,7 +177,7 @@ class Intention:
         known = self.forecast
         return PredictionSummary(
             category=primitive.category,
-            occurrences=self.rampe.categories.get(primitive.category, 0),
+            occurrences=self.rampe.occurrences(primitive.category),
             mean=None if known is None else known.mean,
             scale=None if known is None else known.scale,
             dof=None if known is None else known.dof,

@@ -97,8 +97,10 @@ class Rampe:
             raise ValueError(f"{actuators} actuators and {observations} observations cannot be")
         self._n = actuators
         self._observations = observations
-        bayesian = {"limits": limits, "prior": prior, "basis": basis, "config": config}
-        _only("faithful" if mode == "bayesian" else "bayesian", mode, bayesian, regressors, noise)
+        if mode == "bayesian":
+            _foreign("faithful", regressors=regressors, noise=noise)
+        else:
+            _foreign("bayesian", prior=prior, basis=basis, config=config)
         self._faithful: Faithful | None = None
         self._adaptive: Adaptive | None = None
         if mode == "faithful":
@@ -134,6 +136,13 @@ class Rampe:
                 c: e.occurrences for c, e in self._adaptive.experiences.items() if e.occurrences
             }
         return dict(self._model.categories)
+
+    def occurrences(self, category: Category) -> int:
+        """How often a category was seen; unlike `categories` it looks at no other."""
+        if self._adaptive is None:
+            return self._model.occurrences(category)
+        own = self._adaptive.experiences.get(category)
+        return 0 if own is None else own.occurrences
 
     @property
     def refused(self) -> dict[str, int]:
@@ -267,15 +276,8 @@ def _bounds(actuators: int, limits: npt.ArrayLike | None) -> FloatArray:
     return bounds
 
 
-def _only(
-    other: str,
-    mode: str,
-    bayesian: Mapping[str, object],
-    regressors: object,
-    noise: object,
-) -> None:
-    """Refuse a setting that the chosen mode does not have, rather than ignore it."""
-    foreign = {"regressors": regressors, "noise": noise} if mode == "bayesian" else bayesian
-    given = [name for name, value in foreign.items() if value is not None and name != "limits"]
+def _foreign(mode: str, **settings: object) -> None:
+    """Refuse settings that only the other ``mode`` has, rather than ignore them."""
+    given = [name for name, value in settings.items() if value is not None]
     if given:
-        raise ValueError(f"{', '.join(given)}: only in mode {other!r}, this is {mode!r}")
+        raise ValueError(f"{', '.join(given)}: only in mode {mode!r}")

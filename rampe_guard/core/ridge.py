@@ -1,7 +1,7 @@
 """The paper's recursion begun from a prior: bases of finitely many functions.
 
-For the actuators of one category that share a basis, with observations counted from the
-category's first one:
+For the actuators of one category that share a basis, with observations counted from the middle
+of what had been seen when the category began:
 
     P ← λP + hᵀh,   r ← λr + hᵀx           equation (4), and (3) in information form
     Θ̂ = (P₀ + P)⁻¹ (r + P₀Θ₀)
