@@ -15,7 +15,8 @@ from rampe_guard.core.config import GuardConfig
 from rampe_guard.core.displacement import DisplacementForecast
 from rampe_guard.core.events import PredictionEvent, PredictionSummary, SweepSummary
 from rampe_guard.core.joystick import CategoryChange, CategoryDetector
-from rampe_guard.core.passing import Moment, UnderWay
+from rampe_guard.core.moments import MomentKeeper
+from rampe_guard.core.passing import UnderWay
 from rampe_guard.core.primitive import FinishedPrimitive, Primitive, PrimitiveTracker
 from rampe_guard.core.rampe import Rampe
 from rampe_guard.core.start_observer import StartObserver
@@ -23,9 +24,6 @@ from rampe_guard.core.types import ActuatorSample, FloatArray, JoystickSample
 
 _UPDATE_S = 0.2
 """Shortest time between two updates of one prediction [s]."""
-_MOMENT_S = 0.1
-"""Time between two moments that are kept of a primitive under way [s]."""
-_MOST_MOMENTS = 100
 
 
 class Intention:
@@ -56,9 +54,7 @@ class Intention:
         self._stamp_s = 0.0
         self._velocity = np.zeros(len(config.actuators))
         self._xi = np.zeros(self._observer.size)
-        self._peak = np.zeros(len(config.actuators))
-        self._moments: list[Moment] = []
-        self._moment_s = float("-inf")
+        self._keeper: MomentKeeper | None = None
 
     @property
     def current(self) -> Primitive | None:
@@ -72,11 +68,9 @@ class Intention:
 
     def under_way(self) -> UnderWay | None:
         """Lever and speed as they bear on the primitive under way, or None without one."""
-        if self.current is None:
+        if self._keeper is None:
             return None
-        sign = np.array(self.current.category, dtype=np.float64)
-        speed = np.clip(sign * self._velocity / self._top, 0.0, 1.0)
-        return UnderWay(np.abs(self.command), self._peak.copy(), speed)
+        return self._keeper.under_way(self._velocity, self.command)
 
     def joystick(
         self, sample: JoystickSample, now_s: float, *, learn: bool
@@ -96,7 +90,8 @@ class Intention:
         change = self._detector.advance(sample.stamp_s)
         self._observer.update(sample.stamp_s, self.command, velocity / self._top)
         events = self._changed(change, now_s, learn=learn)
-        self._keep_moment(sample)
+        if self._keeper is not None:
+            self._keeper.see(sample.stamp_s, sample.position, velocity, self.command)
         return events
 
     def interrupt(self) -> None:
@@ -108,7 +103,7 @@ class Intention:
         self._tracker.reset()
         self._detector.reset()
         self._observer.pause()
-        self.forecast = None
+        self.forecast = self._keeper = None
 
     def summary(self, q: FloatArray) -> PredictionSummary | None:
         """The primitive under way, seen from position q (n,)."""
@@ -136,29 +131,14 @@ class Intention:
             self.lessons[refusal or "learned"] += 1
             summary = self._summary(finished.primitive, finished.displacement)
             events.append(self._event("ended", summary, now_s, refusal=refusal))
-        self.forecast = None
-        self._peak = np.zeros(len(self._top))
-        self._moments, self._moment_s = [], float("-inf")
+        self.forecast = self._keeper = None
         current = self._tracker.current
         if current is not None:
+            self._keeper = MomentKeeper(current.category, current.start, self._top)
             self._xi = self._observer.start()
             self.forecast = self.rampe.predict(current.category, current.start, self._xi)
             events.append(self._event("started", self._summary(current, current.start * 0), now_s))
         return events
-
-    def _keep_moment(self, sample: ActuatorSample) -> None:
-        """Remember what lever and speed were: how it ends will say what they meant."""
-        current, known = self.current, self.forecast
-        self._peak = np.maximum(self._peak, np.abs(self.command))
-        if current is None or known is None or len(self._moments) >= _MOST_MOMENTS:
-            return
-        under_way = self.under_way()
-        if under_way is None or sample.stamp_s - self._moment_s < _MOMENT_S:
-            return
-        self._moment_s = sample.stamp_s
-        sign = np.array(current.category, dtype=np.float64)
-        progress = np.maximum(sign * (sample.position - current.start), 0.0)
-        self._moments.append(Moment(progress, under_way))
 
     def _learn(self, finished: FinishedPrimitive) -> str | None:
         """Learn a finished primitive; returns why not, if it was not."""
@@ -169,8 +149,8 @@ class Intention:
             return "too_short"
         x = finished.displacement
         refusal = self.rampe.observe(primitive.category, primitive.start, x, self._xi)
-        if refusal is None and self.forecast is not None:
-            self.rampe.learn_passing(self.forecast, self._moments, x)
+        if refusal is None and self.forecast is not None and self._keeper is not None:
+            self.rampe.learn_passing(self.forecast, self._keeper.moments, x)
         return refusal
 
     def _summary(self, primitive: Primitive, progress: FloatArray) -> PredictionSummary:

@@ -11,11 +11,11 @@ from importlib.metadata import version
 from typing import Any
 
 from rampe_guard import __version__
+from rampe_guard.core.moments import SPACING_S
 from rampe_guard.core.types import FloatArray
 from rampe_guard.evaluate.calibration import AHEAD, Reliability
 from rampe_guard.evaluate.prediction import FORECASTERS, RAMPE, Calibration, Errors, Prediction
 from rampe_guard.evaluate.prediction_score import KNOWN, RESAMPLES, Error, Interval
-from rampe_guard.evaluate.predictive import SPACING_S
 from rampe_guard.evaluate.segments import Run
 from rampe_guard.settings import Site
 

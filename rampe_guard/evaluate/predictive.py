@@ -4,16 +4,10 @@ from __future__ import annotations
 
 from typing import Protocol
 
-import numpy as np
-
+from rampe_guard.core.moments import MomentKeeper
 from rampe_guard.core.passing import Moment, UnderWay
 from rampe_guard.core.types import FloatArray
 from rampe_guard.evaluate.segments import Segment
-
-SPACING_S = 0.1
-"""Moments of one primitive lie at least this far apart [s]."""
-_MOST = 100
-"""Moments of one primitive that the guard keeps."""
 
 
 class Predictive(Protocol):
@@ -43,15 +37,10 @@ def moments(segment: Segment, top_speed: FloatArray) -> list[Moment]:
         segment: a primitive.
         top_speed: of each actuator (n,) [unit/s].
     """
-    sign = np.array(segment.start.category, dtype=np.float64)
-    peaks = np.maximum.accumulate(np.abs(segment.commands), axis=0)
-    found: list[Moment] = []
-    last_s = -np.inf
-    for k, t in enumerate(segment.times_s.tolist()):
-        if t - last_s >= SPACING_S and len(found) < _MOST:
-            speed = np.clip(sign * segment.velocities[k] / top_speed, 0.0, 1.0)
-            under_way = UnderWay(np.abs(segment.commands[k]), peaks[k], speed)
-            progress = np.maximum(sign * (segment.path[k] - segment.start.q), 0.0)
-            found.append(Moment(progress, under_way))
-            last_s = t
-    return found
+    keeper = MomentKeeper(segment.start.category, segment.start.q, top_speed)
+    way = zip(
+        segment.times_s.tolist(), segment.path, segment.velocities, segment.commands, strict=True
+    )
+    for seen in way:
+        keeper.see(*seen)
+    return keeper.moments
