@@ -7,12 +7,12 @@ arrays are laid end to end, and cut again by the sizes that stand beside them.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 import numpy.typing as npt
 
+from rampe_guard.core.arrays import Arrays, Roll, check_settings, entry, flat
 from rampe_guard.core.experience import Experience
 from rampe_guard.core.scales import Scales
 from rampe_guard.core.screening import Refusal
@@ -21,7 +21,6 @@ from rampe_guard.core.types import FloatArray
 if TYPE_CHECKING:
     from rampe_guard.core.adaptive import Adaptive
 
-Arrays = Mapping[str, npt.NDArray[np.generic]]
 _VERSION = 1
 _REASONS: tuple[str, ...] = get_args(Refusal)
 
@@ -42,15 +41,15 @@ def _views(model: Adaptive, own: list[Experience]) -> dict[str, npt.NDArray[np.g
         "occurrences": np.array([e.occurrences for e in own], dtype=np.int64),
         "remembered": np.array([len(e.trust) for e in own], dtype=np.int64),
         "evidence": np.array([e.evidence for e in own], dtype=np.float64),
-        "starts": _flat([e.starts for e in own]),
-        "moves": _flat([e.moves for e in own]),
-        "trust": _flat([e.trust for e in own]),
-        "surprise": _flat([e.surprise for e in own]),
-        "drift": _flat([e.drift for e in own]),
+        "starts": flat([e.starts for e in own]),
+        "moves": flat([e.moves for e in own]),
+        "trust": flat([e.trust for e in own]),
+        "surprise": flat([e.surprise for e in own]),
+        "drift": flat([e.drift for e in own]),
         "suspected": np.array([e.suspect is not None for e in own], dtype=np.bool_),
-        "suspects": _flat([e.suspect for e in own if e.suspect is not None]),
-        "ridge_centers": _flat([r.center for r in ridges]),
-        "ridge_sums": _flat([a for r in ridges for a in (r.precision, r.moment)]),
+        "suspects": flat([e.suspect for e in own if e.suspect is not None]),
+        "ridge_centers": flat([r.center for r in ridges]),
+        "ridge_sums": flat([a for r in ridges for a in (r.precision, r.moment)]),
         "scale_low": scales.low,
         "scale_high": scales.high,
         "scale_inverse": scales.inverse,
@@ -78,10 +77,7 @@ def restore(model: Adaptive, arrays: Arrays) -> Adaptive:
     Raises:
         ValueError: it is of another estimator, or damaged.
     """
-    for name, mine in _settings(model).items():
-        theirs = _entry(arrays, name)
-        if not np.array_equal(theirs, mine):
-            raise ValueError(f"{name} is {theirs.tolist()}, this estimator has {mine.tolist()}")
+    check_settings(arrays, _settings(model))
     fresh = model.empty()
     scales, spread, passing = fresh.scales, fresh.spread, fresh.passing
     for name in ("low", "high", "inverse", "moved", "count", "total", "largest"):
@@ -106,7 +102,7 @@ def restore(model: Adaptive, arrays: Arrays) -> Adaptive:
 
 
 def _experiences(model: Adaptive, arrays: Arrays) -> list[Experience]:
-    categories = _entry(arrays, "categories")
+    categories = entry(arrays, "categories")
     total = categories.size // model.n
     if categories.shape != (total, model.n) or not np.isin(categories, (-1, 0, 1)).all():
         raise ValueError(f"categories of shape {categories.shape}, need signs ({total}, {model.n})")
@@ -117,7 +113,7 @@ def _experiences(model: Adaptive, arrays: Arrays) -> list[Experience]:
     if (per["occurrences"] < per["remembered"]).any():
         raise ValueError("a category remembers more primitives than it has seen")
     names = ("starts", "moves", "trust", "surprise", "drift", "suspects")
-    rolls = {name: _Roll(name, arrays) for name in (*names, "ridge_centers", "ridge_sums")}
+    rolls = {name: Roll(name, arrays) for name in (*names, "ridge_centers", "ridge_sums")}
     result = []
     for i, signs in enumerate(categories):
         own = model.begin(tuple(int(s) for s in signs), np.zeros(model.width))
@@ -146,29 +142,6 @@ def _experiences(model: Adaptive, arrays: Arrays) -> list[Experience]:
     return result
 
 
-class _Roll:
-    """An array of arrays laid end to end, cut off piece by piece."""
-
-    def __init__(self, name: str, arrays: Arrays) -> None:
-        self._name = name
-        self._values = _entry(arrays, name).astype(np.float64)
-        self._at = 0
-        if self._values.ndim != 1 or not np.isfinite(self._values).all():
-            raise ValueError(f"{name} has shape {self._values.shape}, or is not finite")
-
-    def take(self, *shape: int) -> FloatArray:
-        size = int(np.prod(shape))
-        piece = self._values[self._at : self._at + size]
-        if len(piece) != size:
-            raise ValueError(f"{self._name} ends after {len(self._values)} values")
-        self._at += size
-        return piece.reshape(shape).copy()
-
-    def end(self) -> None:
-        if self._at != len(self._values):
-            raise ValueError(f"{self._name} has {len(self._values)} values, {self._at} belong")
-
-
 def _settings(model: Adaptive) -> dict[str, npt.NDArray[np.generic]]:
     """What must be the same for a snapshot to fit."""
     return {
@@ -180,21 +153,8 @@ def _settings(model: Adaptive) -> dict[str, npt.NDArray[np.generic]]:
     }
 
 
-def _flat(arrays: list[FloatArray]) -> FloatArray:
-    return np.concatenate([np.zeros(0), *(a.ravel() for a in arrays)])
-
-
-def _entry(arrays: Arrays, name: str) -> npt.NDArray[np.generic]:
-    if name not in arrays:
-        raise ValueError(f"{name} is missing")
-    values = np.asarray(arrays[name])
-    if values.dtype.kind not in "biuf":
-        raise ValueError(f"{name} holds {values.dtype}, not numbers")
-    return values
-
-
 def _like(arrays: Arrays, name: str, mine: FloatArray) -> FloatArray:
-    values = _entry(arrays, name).astype(np.float64)
+    values = entry(arrays, name).astype(np.float64)
     if values.shape != mine.shape or np.isnan(values).any():
         raise ValueError(f"{name} has shape {values.shape}, need {mine.shape} without NaN")
     return values

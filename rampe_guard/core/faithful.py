@@ -22,6 +22,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from rampe_guard.core.arrays import Arrays, Roll, check_settings, entry, flat
 from rampe_guard.core.basis import Regressor, affine, same
 from rampe_guard.core.faithful_memory import Group, Memory, Unpacker, pack
 from rampe_guard.core.noise import LearnedNoise, Weighting, weighting
@@ -181,48 +182,33 @@ class Faithful:
         return self._settings() | {
             "categories": np.array(list(self._memory), dtype=np.int64).reshape(-1, self._n),
             "occurrences": np.array(counts, dtype=np.int64),
-            "values": np.concatenate([np.zeros(0), *packed]),
+            "values": flat(packed),
         }
 
-    def restore(self, snapshot: Mapping[str, npt.NDArray[np.generic]]) -> None:
+    def restore(self, snapshot: Arrays) -> None:
         """Go on, bit for bit, where the estimator stood that gave ``snapshot``.
 
         Raises:
             ValueError: it is of another estimator, or damaged; nothing has changed then.
         """
-        for name, mine in self._settings().items():
-            theirs = _entry(snapshot, name)
-            if not np.array_equal(theirs, mine):
-                raise ValueError(f"snapshot has {name} {theirs.tolist()}, need {mine.tolist()}")
+        check_settings(snapshot, self._settings())
         categories = _integers(snapshot, "categories")
         counts = _integers(snapshot, "occurrences")
-        values = _entry(snapshot, "values")
+        values = Roll("values", snapshot)
         if counts.ndim != 1 or categories.shape != (len(counts), self._n) or (counts < 1).any():
             raise ValueError(
                 f"snapshot has categories of shape {categories.shape}, occurrences {counts}"
             )
-        if values.ndim != 1 or values.dtype.kind != "f":
-            raise ValueError(f"snapshot has values {values.dtype} {values.shape}, need numbers")
-        if not np.isfinite(values).all():
-            raise ValueError("snapshot has values that are not finite")
-        unpacker = Unpacker(
-            np.asarray(values, dtype=np.float64),
-            self._n,
-            sum(self._sizes),
-            self._n_init,
-            learned=self._learned,
-        )
+        unpacker = Unpacker(values, self._n, sum(self._sizes), self._n_init, learned=self._learned)
         memory: dict[Category, Memory] = {}
         for row, count in zip(categories.tolist(), counts.tolist(), strict=True):
             category = tuple(row)
             self._check_category(category)
             groups = self._special.get(category, self._common).groups
             memory[category] = unpacker.memory(groups, count)
-        if unpacker.taken != len(values) or len(memory) != len(counts):
-            raise ValueError(
-                f"snapshot has {len(values)} values of {len(counts)} categories,"
-                f" need {unpacker.taken} of {len(memory)}"
-            )
+        values.end()
+        if len(memory) != len(counts):
+            raise ValueError(f"snapshot has {len(counts)} categories, of {len(memory)} names")
         self._memory = memory
 
     def _initialise(
@@ -381,14 +367,8 @@ def _moderate(v: FloatArray) -> bool:
         return bool(v.dot(v) < _LARGEST**2)
 
 
-def _entry(snapshot: Mapping[str, npt.NDArray[np.generic]], name: str) -> npt.NDArray[np.generic]:
-    if name not in snapshot:
-        raise ValueError(f"snapshot has no {name}")
-    return np.asarray(snapshot[name])
-
-
-def _integers(snapshot: Mapping[str, npt.NDArray[np.generic]], name: str) -> npt.NDArray[np.int64]:
-    array = _entry(snapshot, name)
+def _integers(snapshot: Arrays, name: str) -> npt.NDArray[np.int64]:
+    array = entry(snapshot, name)
     if array.dtype.kind not in "iu":
         raise ValueError(f"snapshot has {name} of type {array.dtype}, need integers")
     return array.astype(np.int64)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from rampe_guard.core.arrays import Roll, flat
 from rampe_guard.core.noise import LearnedNoise
 from rampe_guard.core.rls import Shared, Stacked
 from rampe_guard.core.types import FloatArray, Indices
@@ -51,35 +51,32 @@ def pack(memory: Memory) -> FloatArray:
     """All that a category has learned, in a row."""
     parts = [part for pair in memory.first for part in pair]
     for state in memory.states:
-        parts += [state.theta.ravel(), state.moment.ravel()]
+        parts += [state.theta, state.moment]
         if isinstance(state, Stacked):
-            parts.append(state.cross.ravel())
+            parts.append(state.cross)
     if memory.noise is not None:
         noise = memory.noise
-        parts += [noise.prior, noise.scatter.ravel(), np.array([noise.weight])]
-    return np.concatenate(parts)
+        parts += [noise.prior, noise.scatter, np.array([noise.weight])]
+    return flat(parts)
 
 
 class Unpacker:
     """Takes memories off a row of numbers, in the order in which ``pack`` laid them down.
 
     Args:
-        values: the row.
+        row: the numbers.
         n: actuators.
         width: length of all distinct regressors together.
         n_init: occurrences before the first estimate.
         learned: whether each category has a noise of its own.
     """
 
-    def __init__(
-        self, values: FloatArray, n: int, width: int, n_init: int, *, learned: bool
-    ) -> None:
-        self._values = values
+    def __init__(self, row: Roll, n: int, width: int, n_init: int, *, learned: bool) -> None:
+        self._take = row.take
         self._n = n
         self._width = width
         self._n_init = n_init
         self._learned = learned
-        self.taken = 0
 
     def memory(self, groups: Sequence[Group], occurrences: int) -> Memory:
         """The next memory, of a category with these groups.
@@ -102,10 +99,3 @@ class Unpacker:
         if group.owner is None:
             return Shared(self._take(n, p), self._take(p, p))
         return Stacked(self._take(p), self._take(p, p), self._take(p, n), group.owner)
-
-    def _take(self, *shape: int) -> FloatArray:
-        begin, self.taken = self.taken, self.taken + math.prod(shape)
-        if self.taken > len(self._values):
-            raise ValueError(f"snapshot ends at value {len(self._values)}, too early")
-        # a copy, so that its arithmetic is that of any array of this shape
-        return self._values[begin : self.taken].reshape(shape).copy()

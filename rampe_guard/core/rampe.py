@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from rampe_guard.core.adaptive import Adaptive
 from rampe_guard.core.adaptive_state import restore, snapshot
+from rampe_guard.core.arrays import Arrays
 from rampe_guard.core.basis import Regressor, affine
 from rampe_guard.core.config import Basis, PriorConfig, RampeConfig
 from rampe_guard.core.displacement import DisplacementForecast
@@ -230,7 +231,7 @@ class Rampe:
         """All that was learned, as plain numeric arrays."""
         return self._model.snapshot() if self._adaptive is None else snapshot(self._adaptive)
 
-    def restore(self, arrays: Mapping[str, npt.NDArray[np.generic]]) -> None:
+    def restore(self, arrays: Arrays) -> None:
         """Go on where a `snapshot` was taken.
 
         Raises:
