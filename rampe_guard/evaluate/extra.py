@@ -5,8 +5,8 @@ from __future__ import annotations
 from rampe_guard.errors import RampeGuardError
 
 
-def missing(error: ModuleNotFoundError) -> RampeGuardError:
+def missing(error: ImportError) -> RampeGuardError:
     """The error for a user without the extra."""
     return RampeGuardError(
-        f"evaluate needs {error.name}, which is not installed: pip install 'rampe-guard[eval]'"
+        f"this needs {error.name}, which is not installed: pip install 'rampe-guard[eval]'"
     )

@@ -15,7 +15,9 @@ from rampe_guard.core.displacement import DisplacementForecast
 from rampe_guard.core.intention import Intention
 from rampe_guard.core.rampe import Rampe
 from rampe_guard.core.types import Category, FloatArray
+from rampe_guard.evaluate.paper_estimates import N_INIT, TOL
 from rampe_guard.evaluate.predictive import moments
+from rampe_guard.evaluate.running_mean import MeanByCategory
 from rampe_guard.evaluate.segments import Segment, Start
 
 
@@ -61,18 +63,15 @@ class RunningMean:
     """The mean of what the category did."""
 
     def __init__(self) -> None:
-        self._mean: dict[Category, tuple[int, FloatArray]] = {}
+        self._means = MeanByCategory()
 
     def predict(self, start: Start) -> FloatArray | None:
         """Mean displacement of the category (n,) [unit]."""
-        known = self._mean.get(start.category)
-        return None if known is None else known[1]
+        return self._means.of(start.category)
 
     def observe(self, segment: Segment) -> None:
         """Move the mean."""
-        x = segment.displacement
-        count, mean = self._mean.get(segment.start.category, (0, np.zeros_like(x)))
-        self._mean[segment.start.category] = (count + 1, mean + (x - mean) / (count + 1))
+        self._means.learn(segment.start.category, segment.displacement)
 
 
 class ConstantVelocity:
@@ -100,7 +99,7 @@ class FaithfulRampe:
     """
 
     def __init__(self, actuators: int) -> None:
-        self._model = Rampe(actuators, mode="faithful", n_init=3, tol=1e-6)
+        self._model = Rampe(actuators, mode="faithful", n_init=N_INIT, tol=TOL)
 
     def predict(self, start: Start) -> FloatArray | None:
         """Equation (2)."""

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from rampe_guard.core.rampe import Rampe
 from rampe_guard.core.types import Category, FloatArray
 from rampe_guard.evaluate.paper_primitives import Primitives
+from rampe_guard.evaluate.running_mean import MeanByCategory
 
 N_INIT = 3
 """Occurrences of a category before the paper's first estimate."""
@@ -70,7 +71,7 @@ def judge(seed: int, primitives: Primitives, limits: FloatArray) -> Run:
     made: dict[PredictorName, _Predictor] = {
         "faithful": _ByRampe(Rampe(n, mode="faithful", n_init=N_INIT, tol=TOL), n),
         "default": default,
-        "running mean": _RunningMean(n),
+        "running mean": _RunningMean(),
     }
     estimate = {name: _ask(p, primitives) for name, p in made.items()}
     return Run(seed, primitives, estimate, np.array(default.two_futures, dtype=bool))
@@ -103,16 +104,12 @@ class _ByRampe:
 
 
 class _RunningMean:
-    """The mean displacement of the category so far, wherever it began."""
-
-    def __init__(self, n: int) -> None:
-        self._n = n
-        self._sum: dict[Category, tuple[FloatArray, int]] = {}
+    def __init__(self) -> None:
+        self._means = MeanByCategory()
 
     def estimate(self, category: Category, q: FloatArray) -> FloatArray:
-        total, count = self._sum.get(category, (np.zeros_like(q), 0))
-        return total / max(count, 1)
+        mean = self._means.of(category)
+        return np.zeros_like(q) if mean is None else mean
 
-    def learn(self, category: Category, q: FloatArray, x: FloatArray) -> None:
-        total, count = self._sum.get(category, (np.zeros_like(q), 0))
-        self._sum[category] = (total + x, count + 1)
+    def learn(self, category: Category, q: FloatArray, x: FloatArray) -> None:  # noqa: ARG002
+        self._means.learn(category, x)

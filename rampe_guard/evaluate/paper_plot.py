@@ -1,7 +1,4 @@
-"""What the paper's figures share: style, colours and marks of the categories, saving.
-
-The only importer of matplotlib, which comes with an extra.
-"""
+"""What the paper's figures share: style, colours and marks of the categories, saving."""
 
 from __future__ import annotations
 
@@ -11,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rampe_guard.core.types import Category
-from rampe_guard.errors import RampeGuardError
+from rampe_guard.evaluate.extra import missing
 
 try:
     import matplotlib as mpl
@@ -20,9 +17,7 @@ try:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 except ImportError as error:
-    raise RampeGuardError(
-        f"the figures need matplotlib ({error}); install it with: pip install 'rampe-guard[eval]'"
-    ) from error
+    raise missing(error) from error
 
 __all__ = ["Axes", "Figure", "Line2D", "category_style", "new_figure", "plain", "save", "style"]
 
