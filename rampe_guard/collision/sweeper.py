@@ -14,14 +14,17 @@ from rampe_guard.collision.zones import Solid, build_zone
 from rampe_guard.core.config import SweepConfig
 from rampe_guard.core.convex import ConvexPiece
 from rampe_guard.core.scene import ActuatorLimit, Scene
-from rampe_guard.core.sweep import sweep
+from rampe_guard.core.sweep import sweep, uncomputed
 from rampe_guard.core.sweep_path import ArmMotion
 from rampe_guard.core.sweep_problem import PieceTree, SweepProblem, Zone
+from rampe_guard.core.types import AnyPath
 from rampe_guard.errors import GeometryError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from rampe_guard.collision.urdf import Arm
-    from rampe_guard.core.types import FloatArray, SweepResult
+    from rampe_guard.core.types import FloatArray, Placement, SweepResult
 
 LINK_LEAVES = 32
 LINK_EXCESS_M = 0.005
@@ -47,6 +50,7 @@ class FclSweeper:
         """
         self.arm, self.scene = arm, scene
         self.zones = tuple(item.name for item in scene.objects)
+        self._keyed = frozenset(item.name for item in scene.moving)
         self._config = SweepConfig() if config is None else config
         links = [
             None if mesh is None else piece_tree(mesh, LINK_EXCESS_M, LINK_LEAVES, measured=True)
@@ -75,6 +79,7 @@ class FclSweeper:
         any_path: bool = False,
         clearance: bool = True,
         only: frozenset[str] | None = None,
+        placed: Mapping[str, Placement | None] | None = None,
     ) -> SweepResult:
         """Sweep from ``start`` (n,) along ``displacement`` (n,), both in actuator units.
 
@@ -85,11 +90,14 @@ class FclSweeper:
             clearance: also find how near free zones come; without it they are sooner done and
                 ``clearance_m`` is only what certifying them proved.
             only: names of the zones that are asked about; None asks about all.
+            placed: where the keyed objects stand; not used yet, so each of them is unknown.
 
         Raises:
             ValueError: if a shape is wrong.
         """
         begin = perf_counter()
+        del placed
+        asked = frozenset(self.zones if only is None else only)
         result = sweep(
             self._problem,
             self._oracle,
@@ -98,9 +106,22 @@ class FclSweeper:
             displacement,
             clearance=clearance,
             any_path=any_path,
-            only=only,
+            only=only if self._keyed.isdisjoint(asked) else asked - self._keyed,
         )
+        result = self._with_unknown(result, asked & self._keyed)
         return replace(result, elapsed_ms=1e3 * (perf_counter() - begin))
+
+    def _with_unknown(self, result: SweepResult, names: frozenset[str]) -> SweepResult:
+        """``result`` with the zones of these names in it, unknown, in scene order."""
+        if not names:
+            return result
+        found = {zone.zone: zone for zone in result.zones}
+        found |= {name: uncomputed(name) for name in names}
+        any_path = result.any_path
+        if any_path is AnyPath.FREE:
+            any_path = AnyPath.UNKNOWN
+        zones = tuple(found[name] for name in self.zones if name in found)
+        return replace(result, zones=zones, any_path=any_path)
 
     def link_poses(self, actuators: FloatArray) -> FloatArray:
         """World poses (k, L, 4, 4) of all links for actuator values (k, n)."""

@@ -2,6 +2,9 @@
 
 Poses are 4x4 homogeneous matrices in the world frame [m]. ``margin_m`` is the keep-out
 distance round the object [m]; ``ignore_links`` names links that may touch it.
+
+An object with a ``key`` moves: the shape, as the file places it, is given in the object's own
+frame, and messages on that key place the frame in the world.
 """
 
 from __future__ import annotations
@@ -11,14 +14,25 @@ from typing import TypeAlias
 
 from rampe_guard.core.types import FloatArray, Point
 
+SELF_ZONE = "self:"
+"""How the names of self-collision zones begin; the link's name follows."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KeepOut:
-    """What every solid keep-out object has."""
+    """What every solid keep-out object has.
+
+    ``key``, ``max_speed`` and ``timeout_s`` are for objects that move (never a halfspace):
+    the key of their poses, None for all others; how fast any point of them may move unseen
+    [m/s]; and for how long a pose may be carried on by that speed [s].
+    """
 
     name: str
     margin_m: float
     ignore_links: tuple[str, ...] = ()
+    key: str | None = None
+    max_speed: float = 0.0
+    timeout_s: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,3 +107,27 @@ class Scene:
     objects: tuple[SceneObject, ...]
     path: str = ""
     content_hash: str = ""
+
+    @property
+    def moving(self) -> tuple[SolidObject, ...]:
+        """The objects whose poses come from a key."""
+        return tuple(
+            item
+            for item in self.objects
+            if not isinstance(item, ActuatorLimit) and item.key is not None
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class SelfCollision:
+    """Whether the arm is swept against itself.
+
+    Attributes:
+        enabled: whether it is.
+        margin_m: keep-out distance between two of its links [m].
+        allow: pairs of links that may touch, beside neighbours.
+    """
+
+    enabled: bool = False
+    margin_m: float = 0.0
+    allow: tuple[tuple[str, str], ...] = ()

@@ -167,12 +167,12 @@ def _without_geometry(
     return tuple(
         sweep_limit(zone, start, displacement)
         if finite and not isinstance(zone, Zone)
-        else _uncomputed(zone.name)
+        else uncomputed(zone.name)
         for zone in problem.zones
     )
 
 
-def _uncomputed(name: str) -> ZoneSweep:
+def uncomputed(name: str) -> ZoneSweep:
     """The inputs are unfit: nothing is proven, and motion must be taken to close in."""
     return ZoneSweep(
         zone=name,

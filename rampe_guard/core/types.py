@@ -7,6 +7,7 @@ Times named ``stamp_s`` are on the clock of the sender, times named ``now_s`` or
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Literal, Protocol, TypeAlias
@@ -42,10 +43,36 @@ class ActuatorSample:
 
 
 @dataclass(frozen=True, slots=True)
+class ObjectSample:
+    """One pose message of the keyed object ``name``: its own frame in the world (4, 4) [m].
+
+    ``stamp_s`` None: the message had no stamp, and its arrival counts.
+    """
+
+    name: str
+    pose: FloatArray
+    stamp_s: float | None
+    arrival_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Placement:
+    """Where a keyed object stands now: its frame in the world (4, 4) [m].
+
+    ``grown_m`` is how far any of its points may have gone since it was seen there [m]: every
+    point of the world that is nearer than this to the placed shape may be inside the object.
+    """
+
+    pose: FloatArray
+    grown_m: float
+
+
+@dataclass(frozen=True, slots=True)
 class Inputs:
     """All that arrived since the last step, each list in order of arrival.
 
-    ``rejected`` lists messages that never became a sample, as (input name, reason).
+    ``rejected`` lists messages that never became a sample, as (input name, reason), and
+    ``objects_rejected`` the same of keyed objects, as (object name, reason).
     ``joystick_alive`` is what the joystick's liveliness token says, None without a token.
     """
 
@@ -53,6 +80,8 @@ class Inputs:
     actuators: tuple[ActuatorSample, ...] = ()
     rejected: tuple[tuple[InputName, str], ...] = ()
     joystick_alive: bool | None = None
+    objects: tuple[ObjectSample, ...] = ()
+    objects_rejected: tuple[tuple[str, str], ...] = ()
 
 
 class Certificate(StrEnum):
@@ -190,10 +219,12 @@ class PathSweeper(Protocol):
         any_path: bool = False,
         clearance: bool = True,
         only: frozenset[str] | None = None,
+        placed: Mapping[str, Placement | None] | None = None,
     ) -> SweepResult:
         """Sweep from ``start`` (n,) along ``displacement`` (n,), both in actuator units.
 
         Without ``clearance``, clearances are proven but need not be sharp. With ``only``, the
-        answer is about the zones of these names and no others.
+        answer is about the zones of these names and no others. ``placed`` says where the keyed
+        objects stand; one that is None or not in it could be anywhere, and is unknown.
         """
         ...

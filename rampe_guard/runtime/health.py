@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from rampe_guard import __version__, wire
 from rampe_guard.core.monitor import Health, Status
-from rampe_guard.core.types import FloatArray, InputName, PathSweeper, SweepResult
+from rampe_guard.core.types import FloatArray, InputName, PathSweeper, Placement, SweepResult
 from rampe_guard.settings import Site
 
 _TIMES = 1000
@@ -51,10 +51,16 @@ class TimedSweeper:
         any_path: bool = False,
         clearance: bool = True,
         only: frozenset[str] | None = None,
+        placed: Mapping[str, Placement | None] | None = None,
     ) -> SweepResult:
         """See `PathSweeper.sweep`."""
         result = self._inner.sweep(
-            start, displacement, any_path=any_path, clearance=clearance, only=only
+            start,
+            displacement,
+            any_path=any_path,
+            clearance=clearance,
+            only=only,
+            placed=placed,
         )
         if result.elapsed_ms is not None:
             self._spent.add(result.elapsed_ms)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from rampe_guard.core.config import ActuatorConfig, GuardConfig, Observation, RampeConfig
 from rampe_guard.core.events import PredictionEvent
 from rampe_guard.core.guard import Guard
-from rampe_guard.core.types import FloatArray, SweepResult
+from rampe_guard.core.types import FloatArray, Placement, SweepResult
 from rampe_guard.evaluate.forecasters import SiteRampe
 from rampe_guard.evaluate.segments import cut, position_middle, position_range
 from rampe_guard.runtime.csv_log import CsvLog
@@ -37,8 +38,9 @@ class Nowhere:
         any_path: bool = False,
         clearance: bool = True,
         only: frozenset[str] | None = None,
+        placed: Mapping[str, Placement | None] | None = None,
     ) -> SweepResult:
-        del start, displacement, any_path, clearance, only
+        del start, displacement, any_path, clearance, only, placed
         return SweepResult(())
 
 

@@ -1,6 +1,6 @@
 """`Guard.step` on a one-joint machine with zones in closed form, so every fraction is known."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from rampe_guard.core.types import (
     FloatArray,
     Inputs,
     JoystickSample,
+    Placement,
     SweepResult,
     ZoneSweep,
 )
@@ -42,9 +43,11 @@ class Wall:
         any_path: bool = False,
         clearance: bool = True,
         only: frozenset[str] | None = None,
+        placed: Mapping[str, Placement | None] | None = None,
     ) -> SweepResult:
         """Closed form."""
         assert not any_path
+        assert not placed
         assert not clearance
         if only is not None and "wall" not in only:
             return SweepResult(())

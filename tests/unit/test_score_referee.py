@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rampe_guard.assembly import load_machine
-from rampe_guard.core.types import Certificate, FloatArray, SweepResult, ZoneSweep
+from rampe_guard.core.types import Certificate, FloatArray, Placement, SweepResult, ZoneSweep
 from rampe_guard.evaluate.referee import Referee
 from rampe_guard.settings import load_site
 
@@ -24,8 +25,9 @@ class WallAtOne:
         any_path: bool = False,
         clearance: bool = True,
         only: frozenset[str] | None = None,
+        placed: Mapping[str, Placement | None] | None = None,
     ) -> SweepResult:
-        del any_path, clearance, only
+        del any_path, clearance, only, placed
         a, b = float(start[0]), float(start[0] + displacement[0])
         kind, fraction = Certificate.FREE, None
         if max(a, b) >= 5.0:
