@@ -1,0 +1,180 @@
+"""Shapes of few vertices that provably contain a set of points: hull, thinned hull, or box.
+
+Every function returns vertices and a radius: no given point is farther than the radius from the
+hull of the vertices. That holds whatever Qhull or an eigenvector did: what was left out is
+measured against a point of the hull that is written out, and rounding is paid for by the radius.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from rampe_guard.collision.mesh_topology import IntArray
+
+if TYPE_CHECKING:
+    from rampe_guard.core.types import FloatArray
+
+FEW = 40
+"""So many vertices need no hull."""
+MOST = 96
+"""Hulls of more vertices are thinned out."""
+KEPT = 64
+"""Directions in which a thinned hull keeps its outermost vertex."""
+ROUNDING = 1e-13
+"""Share of the largest coordinate that the arithmetic here may err by."""
+
+
+def hull_points(points: FloatArray) -> tuple[IntArray, float]:
+    """Which of some points (k, 3) span their hull, and the radius [m] that covers the others.
+
+    Falls back to all points where they are too flat for Qhull, and few.
+    """
+    try:
+        found = ConvexHull(points)
+    except QhullError:
+        return _flat_hull(points)
+    kept = np.sort(found.vertices)
+    rest = np.delete(np.arange(len(points)), kept)
+    # Qhull drops vertices within its precision of a facet; those are measured like any other
+    outside = np.zeros(len(rest), dtype=bool)
+    for block in np.array_split(np.arange(len(found.equations)), 1 + len(rest) // 500):
+        plane = found.equations[block]
+        outside |= (points[rest] @ plane[:, :3].T + plane[:, 3] > 0.0).any(axis=1)
+    radius = _reach(points[rest[outside]], points[found.simplices])
+    return kept.astype(np.int64), radius + ROUNDING * float(np.abs(points).max())
+
+
+def thinned(points: FloatArray) -> tuple[IntArray, float]:
+    """About KEPT of the vertices (k, 3) of a hull, and the radius [m] that covers the others."""
+    local = points - points.mean(axis=0)
+    _, spread, axes = np.linalg.svd(local, full_matrices=False)
+    # outermost as seen after stretching the set to a round one, or a long one keeps only its ends
+    whitened = local @ axes.T / np.maximum(spread, 1e-6 * spread[0])
+    kept = np.unique(np.argmax(whitened @ _DIRECTIONS.T, axis=0))
+    rest = np.delete(np.arange(len(points)), kept)
+    try:
+        simplices = kept[ConvexHull(points[kept]).simplices]
+    except QhullError:
+        return np.arange(len(points)), 0.0
+    radius = _reach(points[rest], points[simplices])
+    return kept, radius + ROUNDING * float(np.abs(points).max())
+
+
+def boxes(points: FloatArray, starts: IntArray) -> FloatArray:
+    """Corners (n, 8, 3) of a box round each run of points (k, 3): upright or along its axes.
+
+    Args:
+        points: of all runs, one after the other [m].
+        starts: where each run begins (n,).
+    """
+    count = np.diff(np.append(starts, len(points)))
+    run = np.repeat(np.arange(len(starts)), count)
+    low, high = np.minimum.reduceat(points, starts), np.maximum.reduceat(points, starts)
+    axes = principal_axes(points, starts)
+    local = np.einsum("kc,kca->ka", points, axes[run])
+    low_p, high_p = np.minimum.reduceat(local, starts), np.maximum.reduceat(local, starts)
+    # by volume, flat ones by area: the first sides are compared with a grain of thickness
+    grain = 1e-3 * (high - low).max(axis=1, keepdims=True)
+    upright = np.prod(high - low + grain, axis=1) <= np.prod(high_p - low_p + grain, axis=1)
+    axes = np.where(upright[:, None, None], np.eye(3), axes)
+    low, high = np.where(upright[:, None], low, low_p), np.where(upright[:, None], high, high_p)
+    pad = ROUNDING * 10.0 * np.maximum(np.abs(low), np.abs(high)).max(axis=1)[:, None]
+    sides = np.stack([low - pad, high + pad], axis=1)
+    corners = np.stack([sides[:, _CORNERS[:, axis], axis] for axis in range(3)], axis=2)
+    return np.asarray(np.einsum("nka,nca->nkc", corners, axes))
+
+
+def principal_axes(points: FloatArray, starts: IntArray) -> FloatArray:
+    """Principal axes of each run of points as columns (n, 3, 3), the thinnest first."""
+    count = np.diff(np.append(starts, len(points)))
+    mean = np.add.reduceat(points, starts) / count[:, None]
+    local = points - np.repeat(mean, count, axis=0)
+    spread = np.empty((len(starts), 3, 3))
+    for i in range(3):
+        for j in range(i, 3):
+            spread[:, i, j] = np.add.reduceat(local[:, i] * local[:, j], starts)
+            spread[:, j, i] = spread[:, i, j]
+    return np.asarray(np.linalg.eigh(spread)[1])
+
+
+def _flat_hull(points: FloatArray) -> tuple[IntArray, float]:
+    """The hull of points in or near a plane, or on a line."""
+    if len(points) <= FEW:
+        return np.arange(len(points)), 0.0
+    local = points - points.mean(axis=0)
+    _, _, axes = np.linalg.svd(local, full_matrices=False)
+    flat = local @ axes[:2].T
+    try:
+        kept = ConvexHull(flat).vertices  # in their order round the polygon
+    except QhullError:  # a line: its two ends
+        kept = np.array([np.argmin(flat[:, 0]), np.argmax(flat[:, 0])])
+    fan = [[kept[0], kept[i], kept[min(i + 1, len(kept) - 1)]] for i in range(1, len(kept))]
+    rest = np.delete(np.arange(len(points)), kept)
+    radius = _reach(points[rest], points[np.array(fan)])
+    return kept.astype(np.int64), radius + ROUNDING * float(np.abs(points).max())
+
+
+def _reach(points: FloatArray, triangles: FloatArray) -> float:
+    """Farthest of some points (k, 3) from the nearest of some triangles (t, 3, 3) [m].
+
+    Never too small: the distance is measured to a point that is written as a mixture of corners.
+    """
+    if not len(points):
+        return 0.0
+    a = triangles[:, 0]
+    ab, ac = triangles[:, 1] - a, triangles[:, 2] - a
+    farthest = 0.0
+    for block in np.array_split(points, 1 + len(points) * len(a) // 100_000):
+        v, w = _nearest_weights(block[:, None] - a, ab, ac)
+        gap = block[:, None] - (a + v[..., None] * ab + w[..., None] * ac)
+        farthest = max(farthest, float(np.einsum("kti,kti->kt", gap, gap).min(axis=1).max()))
+    return float(np.sqrt(farthest))
+
+
+def _nearest_weights(
+    offset: FloatArray, ab: FloatArray, ac: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Weights (k, t) of two edges that lead from a corner to about the nearest point.
+
+    Args:
+        offset: from each triangle's corner a to each point (k, t, 3).
+        ab, ac: edges (t, 3).
+    """
+    bb, cc, bc = (np.einsum("ti,ti->t", x, y) for x, y in ((ab, ab), (ac, ac), (ab, ac)))
+    pb, pc = (np.einsum("kti,ti->kt", offset, edge) for edge in (ab, ac))
+    tiny = np.finfo(float).tiny
+    area = bb * cc - bc * bc
+    solid = area > 1e-12 * bb * cc
+    area = np.where(solid, area, 1.0)
+    v, w = (cc * pb - bc * pc) / area, (bb * pc - bc * pb) / area
+    inside = solid & (v >= 0.0) & (w >= 0.0) & (v + w <= 1.0)
+    # else the nearest point is on one of the edges
+    on_b = np.clip(pb / np.maximum(bb, tiny), 0.0, 1.0)
+    on_c = np.clip(pc / np.maximum(cc, tiny), 0.0, 1.0)
+    length = np.maximum(bb + cc - 2.0 * bc, tiny)
+    along = np.clip((pc - pb + bb - bc) / length, 0.0, 1.0)
+    choices = [(on_b, 0.0 * on_b), (0.0 * on_c, on_c), (1.0 - along, along)]
+    best_v, best_w, least = v, w, np.where(inside, -np.inf, np.inf)
+    for x, y in choices:
+        # squared distance less that of the corner: enough to compare
+        value = x * x * bb + y * y * cc + 2.0 * x * y * bc - 2.0 * (x * pb + y * pc)
+        better = value < least
+        best_v, best_w = np.where(better, x, best_v), np.where(better, y, best_w)
+        least = np.where(better, value, least)
+    return best_v, best_w
+
+
+def _even_directions(count: int) -> FloatArray:
+    """Unit vectors spread evenly (count, 3), by the golden angle."""
+    k = np.arange(count) + 0.5
+    height = 1.0 - 2.0 * k / count
+    angle = np.pi * (1.0 + np.sqrt(5.0)) * k
+    ring = np.sqrt(1.0 - height * height)
+    return np.column_stack([ring * np.cos(angle), ring * np.sin(angle), height])
+
+
+_DIRECTIONS = _even_directions(KEPT)
+_CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
