@@ -24,6 +24,7 @@ def check(model: SiteModel, problems: Problems) -> None:
     _rampe(model, problems)
     _actuators(model.arm, problems)
     _linkages(model.arm, problems)
+    _self_collision(model, problems)
     if model.log is not None:
         _log(model.log, [a.name for a in model.arm.actuators], problems)
 
@@ -42,7 +43,7 @@ def _keys(model: SiteModel, problems: Problems) -> None:
         problems.add(alive, what, "give the key of the publisher's liveliness token")
     first: dict[str, KeyPath] = {}
     for path, key in keys:
-        if wrong := _wrong_key(key):
+        if wrong := wrong_key(key):
             problems.add(path, f"{show(key)} {wrong}", "give an exact Zenoh key such as a/b/c")
         if key in first:
             other = ".".join(str(part) for part in first[key])
@@ -53,7 +54,18 @@ def _keys(model: SiteModel, problems: Problems) -> None:
             problems.add(path, what, "give another key")
 
 
-def _wrong_key(key: str) -> str | None:
+def used_keys(model: SiteModel) -> dict[str, str]:
+    """Every key that means something at a site, and what."""
+    used = {f"{model.keys.base}/{word}": "a key of the guard itself" for word in PUBLISHED}
+    for name in ("joystick", "actuators", "base"):
+        used[getattr(model.keys, name)] = f"keys.{name}"
+    if model.inputs.joystick.alive_key is not None:
+        used[model.inputs.joystick.alive_key] = "inputs.joystick.alive_key"
+    return used
+
+
+def wrong_key(key: str) -> str | None:
+    """Why ``key`` is no exact Zenoh key, None if it is one."""
     wild = [letter for letter in _WILD if letter in key]
     if wild:
         return f"has {show(wild[0])}, which an exact key cannot have"
@@ -123,6 +135,21 @@ def _linkages(arm: ArmModel, problems: Problems) -> None:
             problems.add((*where, "actuator"), what, did_you_mean(linkage.actuator, limits))
         elif reason := impossible(linkage.drive.to_core(), *limits[linkage.actuator]):
             problems.add((*where, "drive"), reason, "measure its dimensions again")
+
+
+def _self_collision(model: SiteModel, problems: Problems) -> None:
+    """Pairs of two, each once; whether the arm has such links is only known with its URDF."""
+    first: dict[frozenset[str], int] = {}
+    for index, pair in enumerate(model.self_collision.allow):
+        where: KeyPath = ("self_collision", "allow", index)
+        links = frozenset(pair)
+        if len(links) == 1:
+            what = f"names {show(pair[0])} twice"
+            problems.add(where, what, "give the names of two links")
+        elif links in first:
+            what = f"is the same pair as allow[{first[links]}]"
+            problems.add(where, what, "give every pair once, in any order")
+        first.setdefault(links, index)
 
 
 def _log(log: LogModel, names: list[str], problems: Problems) -> None:

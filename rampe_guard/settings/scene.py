@@ -5,7 +5,8 @@ from __future__ import annotations
 import hashlib
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from rampe_guard.core.events import SYSTEM_ZONE
 from rampe_guard.core.scene import (
+    SELF_ZONE,
     ActuatorLimit,
     Box,
     Capsule,
@@ -29,31 +31,37 @@ from rampe_guard.settings import scene_model as models
 from rampe_guard.settings.explain import validate
 from rampe_guard.settings.model import Pose
 from rampe_guard.settings.problems import KeyPath, Problems, did_you_mean, show
+from rampe_guard.settings.scene_motion import Motions, refuse_fixed
 from rampe_guard.settings.source import MAX_MESH_BYTES, Document, parse, read_bytes
 
 _SHORTEST_NORMAL = 1e-9
 _MESH_SUFFIXES = (".stl", ".obj", ".ply")
 
 
-def load_scene(path: str | Path, *, actuators: Sequence[str] = ()) -> Scene:
+def load_scene(
+    path: str | Path, *, actuators: Sequence[str] = (), taken: Mapping[str, str] | None = None
+) -> Scene:
     """Read a scene file.
 
     Args:
         path: the YAML file; meshes are relative to it.
         actuators: names of the site's actuators, in order, for actuator limits.
+        taken: keys that no object may have, and what each of them is.
 
     Raises:
         SettingsError: with file, line, key, value and remedy of every problem.
     """
     content = read_bytes(path, "scene file")
     document = parse(content, str(path))
-    return _scene(document, actuators, Path(path).parent, str(Path(path).absolute()))
+    context = _Context(tuple(actuators), dict(taken or {}), Path(path).parent)
+    return _scene(document, context, str(Path(path).absolute()))
 
 
 def parse_scene(
     content: bytes | str,
     *,
     actuators: Sequence[str] = (),
+    taken: Mapping[str, str] | None = None,
     directory: str | Path = ".",
     name: str = "<scene>",
 ) -> Scene:
@@ -62,13 +70,24 @@ def parse_scene(
     Args:
         content: the YAML text, UTF-8 when bytes.
         actuators: names of the site's actuators, in order.
+        taken: as in `load_scene`.
         directory: where the paths of meshes start.
         name: what messages call the text.
 
     Raises:
         SettingsError: as `load_scene`.
     """
-    return _scene(parse(content, name), actuators, Path(directory), "")
+    context = _Context(tuple(actuators), dict(taken or {}), Path(directory))
+    return _scene(parse(content, name), context, "")
+
+
+@dataclass(frozen=True, slots=True)
+class _Context:
+    """What a scene is read against: the site's actuators and keys, and where its files are."""
+
+    actuators: tuple[str, ...]
+    taken: dict[str, str]
+    directory: Path
 
 
 def pose_matrix(pose: Pose) -> FloatArray:
@@ -97,10 +116,11 @@ def existing_file(
     return None
 
 
-def _scene(document: Document, actuators: Sequence[str], directory: Path, path: str) -> Scene:
+def _scene(document: Document, context: _Context, path: str) -> Scene:
+    refuse_fixed(document)
     model = validate(models.SceneModel, document)
     problems = Problems(document)
-    builder = _Builder(problems, actuators, directory, model.margin_m)
+    builder = _Builder(problems, context, model.margin_m)
     objects: list[SceneObject] = []
     first: dict[str, int] = {}
     for index, item in enumerate(model.objects):
@@ -112,6 +132,9 @@ def _scene(document: Document, actuators: Sequence[str], directory: Path, path: 
         first.setdefault(item.name, index)
         if item.name == SYSTEM_ZONE:
             what = f"{show(item.name)} is the zone of the guard's own alerts"
+            problems.add((*where, "name"), what, "give another name")
+        if item.name.startswith(SELF_ZONE):
+            what = f"{show(item.name)} begins with {SELF_ZONE!r}, as self-collision zones do"
             problems.add((*where, "name"), what, "give another name")
         value = builder.build(item, where)
         if value is not None:
@@ -127,12 +150,11 @@ def _scene(document: Document, actuators: Sequence[str], directory: Path, path: 
 class _Builder:
     """Turns object models into core values; None, and a problem, where it cannot."""
 
-    def __init__(
-        self, problems: Problems, actuators: Sequence[str], directory: Path, margin_m: float
-    ) -> None:
+    def __init__(self, problems: Problems, context: _Context, margin_m: float) -> None:
         self._problems = problems
-        self._actuators = list(actuators)
-        self._directory = directory
+        self._actuators = context.actuators
+        self._directory = context.directory
+        self._motions = Motions(problems, context.taken)
         self._margin_m = margin_m
 
     def build(  # noqa: PLR0911 - one return for each kind
@@ -145,6 +167,8 @@ class _Builder:
             "margin_m": self._margin_m if item.margin_m is None else item.margin_m,
             "ignore_links": item.ignore_links,
         }
+        if isinstance(item, models.MovableModel):
+            common |= self._motions.of(item, where)
         match item:
             case models.BoxModel():
                 return Box(**common, size_m=_point(item.size), pose=pose_matrix(item.pose))

@@ -6,9 +6,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from rampe_guard.core.scene import KeepOut
 from rampe_guard.settings.model import Length, Model, Name, NonNegative, Number, Pose, Text, Vector
 
 MAX_OBJECTS = 1000
+DEFAULT_TIMEOUT_S = KeepOut(name="", margin_m=0.0).timeout_s
 
 
 class _Object(Model):
@@ -25,7 +27,27 @@ class _Solid(_Object):
     )
 
 
-class BoxModel(_Solid):
+class MovableModel(_Solid):
+    """What an object has that may move."""
+
+    key: Text | None = Field(
+        default=None,
+        description="The exact Zenoh key of its poses, for an object that moves: its shape is "
+        "then given in its own frame, which the messages place in the world.",
+    )
+    max_speed: Annotated[float, Field(gt=0.0, le=100.0)] | None = Field(
+        default=None,
+        description="The top speed of any point of it [m/s]: it is grown by this since it was "
+        "seen; needed with key.",
+    )
+    timeout_s: Annotated[float, Field(ge=0.05, le=60.0)] | None = Field(
+        default=None,
+        description=f"The age at which its newest pose is no longer used [s], {DEFAULT_TIMEOUT_S:g}"
+        " if left out: the zone is unknown then, and taken as contact.",
+    )
+
+
+class BoxModel(MovableModel):
     """A box."""
 
     type: Literal["box"] = Field(description="The kind of object.")
@@ -35,7 +57,7 @@ class BoxModel(_Solid):
     pose: Pose = Field(default=Pose(), description="The pose of its centre in the world.")
 
 
-class SphereModel(_Solid):
+class SphereModel(MovableModel):
     """A sphere."""
 
     type: Literal["sphere"] = Field(description="The kind of object.")
@@ -43,7 +65,7 @@ class SphereModel(_Solid):
     center: Vector = Field(description="The centre x, y, z in the world [m].")
 
 
-class CylinderModel(_Solid):
+class CylinderModel(MovableModel):
     """A cylinder along the z axis of its pose."""
 
     type: Literal["cylinder"] = Field(description="The kind of object.")
@@ -52,7 +74,7 @@ class CylinderModel(_Solid):
     pose: Pose = Field(default=Pose(), description="The pose of its centre in the world.")
 
 
-class CapsuleModel(_Solid):
+class CapsuleModel(MovableModel):
     """A power line, pipe or rail: all points near a segment."""
 
     type: Literal["capsule"] = Field(description="The kind of object.")
@@ -73,7 +95,7 @@ class HalfspaceModel(_Solid):
     )
 
 
-class MeshModel(_Solid):
+class MeshModel(MovableModel):
     """A triangle mesh from a file."""
 
     type: Literal["mesh"] = Field(description="The kind of object.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -24,9 +24,9 @@ from rampe_guard.core.config import (
     SweepConfig,
 )
 from rampe_guard.core.drive import CylinderDrive, FourBarDrive
-from rampe_guard.core.scene import Scene
+from rampe_guard.core.scene import Scene, SelfCollision
 from rampe_guard.errors import SettingsError
-from rampe_guard.settings.check import check
+from rampe_guard.settings.check import check, used_keys
 from rampe_guard.settings.explain import validate
 from rampe_guard.settings.model import MAX_NAME, Name
 from rampe_guard.settings.problems import Problems, show
@@ -37,6 +37,7 @@ from rampe_guard.settings.site_model import (
     ColumnModel,
     LogModel,
     MemoryModel,
+    SelfCollisionModel,
     SiteModel,
 )
 from rampe_guard.settings.source import parse, read_bytes
@@ -120,6 +121,7 @@ class Site:
         package_dirs: where package:// meshes of the URDF are looked up.
         operator: whose way of working is learned.
         memory: how it is kept.
+        self_collision: whether the arm is swept against itself.
     """
 
     name: str
@@ -137,6 +139,7 @@ class Site:
     package_dirs: tuple[str, ...] = ()
     operator: str = "operator"
     memory: MemorySettings = MemorySettings()
+    self_collision: SelfCollision = field(default_factory=SelfCollision)
 
     @property
     def actuator_names(self) -> tuple[str, ...]:
@@ -171,7 +174,7 @@ def load_site(path: str | Path) -> Site:
     scene_file = existing_file(problems, ("scene",), directory, model.scene, "scene file")
     if scene_file is not None:
         try:
-            scene = load_scene(scene_file, actuators=names)
+            scene = load_scene(scene_file, actuators=names, taken=used_keys(model))
         except SettingsError as error:
             problems.extend(error)
     memory = _memory(model.memory, directory, problems)
@@ -193,6 +196,7 @@ def load_site(path: str | Path) -> Site:
         package_dirs=tuple(os.path.normpath(directory / d) for d in arm.package_dirs),
         operator=model.operator,
         memory=memory,
+        self_collision=_self_collision(model.self_collision),
     )
 
 
@@ -223,6 +227,11 @@ def _memory(model: MemoryModel, directory: Path, problems: Problems) -> MemorySe
             what = f"{show(model.directory)} begins with a home that does not exist"
             problems.add(("memory", "directory"), what, "give the path of a folder")
     return MemorySettings(model.enabled, folder, model.save_every_s)
+
+
+def _self_collision(model: SelfCollisionModel) -> SelfCollision:
+    pairs = tuple((first, second) for first, second in model.allow)
+    return SelfCollision(model.enabled, model.margin_m, pairs)
 
 
 def _zenoh(model: SiteModel, config: str | None) -> ZenohSettings:

@@ -6,8 +6,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
+from rampe_guard.core.scene import SelfCollision
 from rampe_guard.settings.drive_model import DirectModel, DriveModel
-from rampe_guard.settings.model import Model, Name, Number, Pose, Text
+from rampe_guard.settings.model import Model, Name, NonNegative, Number, Pose, Text
 from rampe_guard.settings.tuning_model import (
     AlertsModel,
     InputsModel,
@@ -18,6 +19,7 @@ from rampe_guard.settings.tuning_model import (
 )
 
 MAX_ACTUATORS = 16
+_SELF = SelfCollision()
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
 Endpoint = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]*/\S+$", max_length=1024)]
@@ -117,6 +119,24 @@ class ArmModel(Model):
     )
 
 
+class SelfCollisionModel(Model):
+    """Whether the arm is swept against itself."""
+
+    enabled: bool = Field(
+        default=_SELF.enabled,
+        description="True if the links of the arm are swept against each other.",
+    )
+    margin_m: NonNegative = Field(
+        default=_SELF.margin_m,
+        description="The keep-out distance between two links of the arm [m].",
+    )
+    allow: tuple[Annotated[tuple[Text, ...], Field(min_length=2, max_length=2)], ...] = Field(
+        default=_SELF.allow,
+        description="The pairs of links that may touch; neighbours and pairs that always touch "
+        "may in any case.",
+    )
+
+
 class ColumnModel(Model):
     """A column of a log and how its numbers become site units."""
 
@@ -182,6 +202,9 @@ class SiteModel(Model):
     )
     arm: ArmModel = Field(description="The arm.")
     scene: Text = Field(description="The scene file, relative to this file.")
+    self_collision: SelfCollisionModel = Field(
+        default=SelfCollisionModel(), description="The sweep of the arm against itself."
+    )
     inputs: InputsModel = Field(default=InputsModel(), description="The limits of plausible input.")
     joystick: JoystickModel = Field(default=JoystickModel(), description="The joystick processing.")
     rampe: RampeModel = Field(default=RampeModel(), description="The estimator.")
