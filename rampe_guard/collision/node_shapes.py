@@ -1,8 +1,9 @@
 """Shapes of few vertices that provably contain a set of points: hull, thinned hull, or box.
 
-Every function returns vertices and a radius: no given point is farther than the radius from the
-hull of the vertices. That holds whatever Qhull or an eigenvector did: what was left out is
-measured against a point of the hull that is written out, and rounding is paid for by the radius.
+A hull comes as the vertices to keep and a radius: no given point is farther than the radius
+from the hull of the vertices. That holds whatever Qhull or an eigenvector did: what was left out
+is measured against a point of the hull that is written out, and rounding is paid for by the
+radius.
 """
 
 from __future__ import annotations
@@ -23,6 +24,10 @@ MOST = 96
 """Hulls of more vertices are thinned out."""
 KEPT = 64
 """Directions in which a thinned hull keeps its outermost vertex."""
+_ADDED = (16, 16)
+"""Vertices that are added to a thinned hull in one go after the other, where it misses most."""
+_FACETS = 6
+"""Facets that are looked at for the nearest one."""
 ROUNDING = 1e-13
 """Share of the largest coordinate that the arithmetic here may err by."""
 
@@ -43,24 +48,36 @@ def hull_points(points: FloatArray) -> tuple[IntArray, float]:
     for block in np.array_split(np.arange(len(found.equations)), 1 + len(rest) // 500):
         plane = found.equations[block]
         outside |= (points[rest] @ plane[:, :3].T + plane[:, 3] > 0.0).any(axis=1)
-    radius = _reach(points[rest[outside]], points[found.simplices])
-    return kept.astype(np.int64), radius + ROUNDING * float(np.abs(points).max())
+    reach, _ = _reaches(points[rest[outside]], points[found.simplices], found.equations)
+    return kept.astype(np.int64), float(reach.max(initial=0.0)) + ROUNDING * float(
+        np.abs(points).max()
+    )
 
 
 def thinned(points: FloatArray) -> tuple[IntArray, float]:
-    """About KEPT of the vertices (k, 3) of a hull, and the radius [m] that covers the others."""
+    """At most MOST of the vertices (k, 3) of a hull, and the radius [m] that covers the others."""
     local = points - points.mean(axis=0)
     _, spread, axes = np.linalg.svd(local, full_matrices=False)
     # outermost as seen after stretching the set to a round one, or a long one keeps only its ends
     whitened = local @ axes.T / np.maximum(spread, 1e-6 * spread[0])
     kept = np.unique(np.argmax(whitened @ _DIRECTIONS.T, axis=0))
-    rest = np.delete(np.arange(len(points)), kept)
-    try:
-        simplices = kept[ConvexHull(points[kept]).simplices]
-    except QhullError:
-        return np.arange(len(points)), 0.0
-    radius = _reach(points[rest], points[simplices])
-    return kept, radius + ROUNDING * float(np.abs(points).max())
+    for more in (*_ADDED, 0):
+        rest = np.delete(np.arange(len(points)), kept)
+        try:
+            found = ConvexHull(points[kept])
+        except QhullError:
+            return np.arange(len(points)), 0.0
+        reach, nearest = _reaches(points[rest], points[kept[found.simplices]], found.equations)
+        if more:
+            kept = np.union1d(kept, rest[_farthest(reach, nearest, more)])
+    return kept, float(reach.max(initial=0.0)) + ROUNDING * float(np.abs(points).max())
+
+
+def _farthest(reach: FloatArray, nearest: IntArray, most: int) -> IntArray:
+    """The farthest point of each facet, and of those the ``most`` farthest."""
+    order = np.argsort(-reach, kind="stable")
+    _, first = np.unique(nearest[order], return_index=True)
+    return np.asarray(order[np.sort(first)[:most]])
 
 
 def boxes(points: FloatArray, starts: IntArray) -> FloatArray:
@@ -71,8 +88,8 @@ def boxes(points: FloatArray, starts: IntArray) -> FloatArray:
         starts: where each run begins (n,).
     """
     count = np.diff(np.append(starts, len(points)))
-    run = np.repeat(np.arange(len(starts)), count)
     low, high = np.minimum.reduceat(points, starts), np.maximum.reduceat(points, starts)
+    run = np.repeat(np.arange(len(starts)), count)
     axes = principal_axes(points, starts)
     local = np.einsum("kc,kca->ka", points, axes[run])
     low_p, high_p = np.minimum.reduceat(local, starts), np.maximum.reduceat(local, starts)
@@ -118,20 +135,39 @@ def _flat_hull(points: FloatArray) -> tuple[IntArray, float]:
 
 
 def _reach(points: FloatArray, triangles: FloatArray) -> float:
-    """Farthest of some points (k, 3) from the nearest of some triangles (t, 3, 3) [m].
+    """Farthest of some points (k, 3) from the hull of some triangles (t, 3, 3), at most [m]."""
+    facets = np.tile(np.arange(len(triangles)), (len(points), 1))
+    return float(_to_facets(points, triangles, facets).min(axis=1, initial=np.inf).max(initial=0.0))
 
-    Never too small: the distance is measured to a point that is written as a mixture of corners.
+
+def _reaches(
+    points: FloatArray, triangles: FloatArray, planes: FloatArray
+) -> tuple[FloatArray, IntArray]:
+    """At most how far each point (k, 3) is from a hull [m] (k,), and a facet near it (k,).
+
+    Only the facets are looked at whose planes (t, 4) the point is farthest beyond: another one
+    may be nearer, so the answer may be too large, never too small.
     """
-    if not len(points):
-        return 0.0
-    a = triangles[:, 0]
-    ab, ac = triangles[:, 1] - a, triangles[:, 2] - a
-    farthest = 0.0
-    for block in np.array_split(points, 1 + len(points) * len(a) // 100_000):
-        v, w = _nearest_weights(block[:, None] - a, ab, ac)
-        gap = block[:, None] - (a + v[..., None] * ab + w[..., None] * ac)
-        farthest = max(farthest, float(np.einsum("kti,kti->kt", gap, gap).min(axis=1).max()))
-    return float(np.sqrt(farthest))
+    beyond = points @ planes[:, :3].T + planes[:, 3]
+    count = min(_FACETS, len(triangles))
+    facets = np.argpartition(-beyond, count - 1, axis=1)[:, :count]
+    distance = _to_facets(points, triangles, facets)
+    best = np.argmin(distance, axis=1)[:, None]
+    nearest = np.take_along_axis(facets, best, axis=1)[:, 0]
+    return np.take_along_axis(distance, best, axis=1)[:, 0], nearest
+
+
+def _to_facets(points: FloatArray, triangles: FloatArray, facets: IntArray) -> FloatArray:
+    """Distances (k, m) of points (k, 3) to the triangles that ``facets`` (k, m) names [m].
+
+    Never too small: each is measured to a point that is written as a mixture of three corners.
+    """
+    a = triangles[facets, 0]
+    ab, ac = triangles[facets, 1] - a, triangles[facets, 2] - a
+    offset = points[:, None] - a
+    v, w = _nearest_weights(offset, ab, ac)
+    gap = offset - (v[..., None] * ab + w[..., None] * ac)
+    return np.asarray(np.sqrt(np.einsum("kti,kti->kt", gap, gap)))
 
 
 def _nearest_weights(
@@ -140,11 +176,12 @@ def _nearest_weights(
     """Weights (k, t) of two edges that lead from a corner to about the nearest point.
 
     Args:
-        offset: from each triangle's corner a to each point (k, t, 3).
-        ab, ac: edges (t, 3).
+        offset: from a corner of a triangle to a point (k, t, 3).
+        ab: edge from that corner (k, t, 3).
+        ac: the other edge from it (k, t, 3).
     """
-    bb, cc, bc = (np.einsum("ti,ti->t", x, y) for x, y in ((ab, ab), (ac, ac), (ab, ac)))
-    pb, pc = (np.einsum("kti,ti->kt", offset, edge) for edge in (ab, ac))
+    bb, cc, bc = (_dot(x, y) for x, y in ((ab, ab), (ac, ac), (ab, ac)))
+    pb, pc = _dot(offset, ab), _dot(offset, ac)
     tiny = np.finfo(float).tiny
     area = bb * cc - bc * bc
     solid = area > 1e-12 * bb * cc
@@ -165,6 +202,10 @@ def _nearest_weights(
         best_v, best_w = np.where(better, x, best_v), np.where(better, y, best_w)
         least = np.where(better, value, least)
     return best_v, best_w
+
+
+def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
+    return np.asarray(np.einsum("kti,kti->kt", a, b))
 
 
 def _even_directions(count: int) -> FloatArray:

@@ -27,14 +27,14 @@ if TYPE_CHECKING:
 
 VERSION = 1
 """Of the trees built here: another one makes kept trees worthless."""
-HULLS = 4096
+HULLS = 1024
 """Most nodes that are wrapped in a hull; those of fewest triangles get a box."""
-THINNED = 512
-"""Most nodes whose hull is thinned out; a large hull of another gets a box."""
-PASSED_ON = 400
+PASSED_ON = 200
 """A hull of more vertices is passed to the node above thinned out."""
-TRIED_POINTS = 600
-"""So many of a node's vertices tell how large the hulls of its halves would be."""
+TRIED_ITEMS = 400
+"""So many of a node's triangles tell how large the hulls of its halves would be."""
+POINTS_AT_ONCE = 200_000
+"""Bounds the memory of what is measured for many nodes at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,8 +72,10 @@ def build_tree(
     atoms = _atoms(mesh, parts)
     say("dividing triangles", 0.1)
     low, high = _atom_boxes(mesh.vertices, atoms)
-    tree = divide(0.5 * (low + high), atoms.triangle < 0, _Chooser(mesh.vertices, atoms))
+    middle = 0.5 * (low + high)
     del low, high
+    tree = divide(middle, atoms.triangle < 0, _Chooser(mesh.vertices, atoms, middle))
+    del middle
     say("wrapping", 0.3)
     atoms = atoms.ordered(tree.order)
     shapes = _Shapes(mesh.vertices, atoms, tree)
@@ -112,18 +114,17 @@ def _atom_boxes(vertices: FloatArray, atoms: _Atoms) -> tuple[FloatArray, FloatA
 class _Chooser:
     """Cuts across that of six axes which leaves the least hull volume."""
 
-    def __init__(self, vertices: FloatArray, atoms: _Atoms) -> None:
+    def __init__(self, vertices: FloatArray, atoms: _Atoms, middle: FloatArray) -> None:
         self._vertices = vertices
         self._atoms = atoms
+        self._middle = middle
 
     def __call__(self, items: IntArray) -> BoolArray | None:
-        begin = self._atoms.begin
-        every = -(-len(items) // TRIED_POINTS)
-        first = begin[items]
-        middle = self._vertices[self._atoms.ids[first]]
-        axes = principal_axes(middle, np.zeros(1, dtype=np.int64))[0]
+        place = self._middle[items]
+        # a share of a large node's triangles tells enough
+        every = -(-len(items) // TRIED_ITEMS)
+        axes = principal_axes(place[::every], np.zeros(1, dtype=np.int64))[0]
         best: tuple[float, BoolArray] | None = None
-        place = self._places(items)
         for axis in (*np.eye(3), *axes.T):
             along = place @ axis
             right = along > 0.5 * (along.min() + along.max())
@@ -133,12 +134,6 @@ class _Chooser:
             if best is None or size < best[0]:
                 best = size, right
         return best[1] if best else None
-
-    def _places(self, items: IntArray) -> FloatArray:
-        rows, starts = spans(self._atoms.begin[items], self._atoms.begin[items + 1])
-        total = np.add.reduceat(self._vertices[self._atoms.ids[rows]], starts)
-        count = self._atoms.begin[items + 1] - self._atoms.begin[items]
-        return np.asarray(total / count[:, None])
 
     def _bulk(self, items: IntArray) -> float:
         """Volume of the hull, and a little of its surface, so that flat ones differ too [m³]."""
@@ -165,10 +160,8 @@ class _Shapes:
         self._filled = 0
         weight = atoms.begin[tree.last] - atoms.begin[tree.first]
         self._weight = weight
-        by_weight = np.argsort(-weight, kind="stable")
-        self._may_hull, self._may_thin = np.zeros((2, nodes), dtype=bool)
-        self._may_hull[by_weight[:HULLS]] = True
-        self._may_thin[by_weight[:THINNED]] = True
+        self._may_hull = np.zeros(nodes, dtype=bool)
+        self._may_hull[np.argsort(-weight, kind="stable")[:HULLS]] = True
         # hull vertices and radius of nodes that the node above may build upon
         self._known: dict[int, tuple[IntArray, float]] = {}
 
@@ -232,31 +225,33 @@ class _Shapes:
         kept, reach = hull_points(self._vertices[ids])
         ids, radius = ids[kept], radius + reach
         self._known[node] = ids, radius
-        if len(ids) > MOST and self._may_thin[node]:
+        if len(ids) > MOST:
             kept, reach = thinned(self._vertices[ids])
             if len(ids) > PASSED_ON:
                 self._known[node] = ids[kept], radius + reach
             ids, radius = ids[kept], radius + reach
-        elif len(ids) > MOST:
-            if len(ids) > PASSED_ON:
-                del self._known[node]
-            self._box(np.array([node]))
-            return
         self._put(np.array([node]), np.array([len(ids)]), self._vertices[ids])
         self.radius[node] = radius
 
     def _box(self, nodes: IntArray) -> None:
-        if not len(nodes):
-            return
-        rows, starts = self._rows(nodes)
-        corners = boxes(self._vertices[self._atoms.ids[rows]], starts)
-        self._put(nodes, np.full(len(nodes), 8), corners.reshape(-1, 3))
+        for some in _bundles(nodes, self._weight[nodes]):
+            rows, starts = self._rows(some)
+            corners = boxes(self._vertices[self._atoms.ids[rows]], starts)
+            self._put(some, np.full(len(some), 8), corners.reshape(-1, 3))
 
     def _put(self, nodes: IntArray, count: IntArray, vertices: FloatArray) -> None:
         self.first[nodes] = self._filled + np.cumsum(count) - count
         self.count[nodes] = count
         self.blocks.append(vertices)
         self._filled += len(vertices)
+
+
+def _bundles(nodes: IntArray, weight: IntArray) -> list[IntArray]:
+    """Nodes (n,) in bundles of about POINTS_AT_ONCE points, given how many each has (n,)."""
+    if not len(nodes):
+        return []
+    bundle = np.cumsum(weight) // POINTS_AT_ONCE
+    return np.split(nodes, np.flatnonzero(np.diff(bundle)) + 1)
 
 
 def _assemble(
@@ -319,17 +314,19 @@ def _measure(
         starts: where each shape's begin.
         covered: area of the triangles below each node (N,) [m²].
     """
+    ball, extent = np.empty((len(starts), 4)), np.empty((len(starts), 3))
     count = np.diff(np.append(starts, len(vertices)))
-    low, high = np.minimum.reduceat(vertices, starts), np.maximum.reduceat(vertices, starts)
-    center = 0.5 * (low + high)
-    reach = np.linalg.norm(vertices - np.repeat(center, count, axis=0), axis=1)
-    ball = np.column_stack([center, np.maximum.reduceat(reach, starts) * (1.0 + 1e-12)])
-    axes = principal_axes(vertices, starts)
-    extent = np.empty((len(starts), 3))
-    node = np.repeat(np.arange(len(starts)), count)
-    for i in range(3):
-        along = np.einsum("kc,kc->k", vertices, axes[node, :, i])
-        extent[:, i] = np.maximum.reduceat(along, starts) - np.minimum.reduceat(along, starts)
+    for some in _bundles(np.arange(len(starts)), count):
+        begin = starts[some[0]]
+        points = vertices[begin : starts[some[-1]] + count[some[-1]]]
+        at = starts[some] - begin
+        run = np.repeat(np.arange(len(some)), count[some])
+        low, high = np.minimum.reduceat(points, at), np.maximum.reduceat(points, at)
+        center = 0.5 * (low + high)
+        reach = np.maximum.reduceat(np.linalg.norm(points - center[run], axis=1), at)
+        ball[some] = np.column_stack([center, reach * (1.0 + 1e-12)])
+        along = np.einsum("kc,kca->ka", points, principal_axes(points, at)[run])
+        extent[some] = np.maximum.reduceat(along, at) - np.minimum.reduceat(along, at)
     broad = extent[:, 1] * extent[:, 2]
     share = 2.0 * covered / np.maximum(broad, np.finfo(float).tiny)
     return ball, extent[:, 0] + extent[:, 1] * np.clip(1.0 - share, 0.0, 1.0)

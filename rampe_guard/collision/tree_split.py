@@ -107,7 +107,7 @@ def _part(
     axis = np.argmax(high - low, axis=1)
     key = np.take_along_axis(place, axis[node][:, None], axis=1)[:, 0]
     cut = np.take_along_axis(0.5 * (low + high), axis[:, None], axis=1)[:, 0]
-    right = key > cut[node]
+    right: BoolArray = np.asarray(key > cut[node])
     chosen = np.zeros(len(begin), dtype=bool)
     if choose is not None:
         for i in np.flatnonzero(count >= CHOSEN_ITEMS):
@@ -125,8 +125,8 @@ def _part(
         rank[ranked] = some - starts[node[some]]
         right[some] = (2 * rank >= count[node])[some]
     toward = np.cumsum(right)
-    toward -= np.repeat(toward[starts] - right[starts], count)
-    rights = toward[starts + count - 1]
+    toward = toward - np.repeat(toward[starts] - right[starts], count)
+    rights: IntArray = toward[starts + count - 1]
     within = np.arange(len(rows)) - starts[node]
     target = np.where(right, (count - rights)[node] + toward - 1, within - toward)
     order[rows[starts[node] + target]] = items
