@@ -29,7 +29,14 @@ class Machine:
             boot_id: makes alert ids unique across restarts.
             sweeper: instead of the machine's own (to time it, say).
         """
-        return Guard(self.site.guard, self.arm.limits, sweeper or self.sweeper, start_s, boot_id)
+        return Guard(
+            self.site.guard,
+            self.arm.limits,
+            sweeper or self.sweeper,
+            start_s,
+            boot_id,
+            self.site.scene.moving,
+        )
 
 
 def load_machine(site: Site) -> Machine:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from rampe_guard.core.alarm import Level, State
-from rampe_guard.core.types import Category, FloatArray, InputName, ZoneSweep
+from rampe_guard.core.types import Category, FloatArray, ZoneSweep
 
 Source: TypeAlias = Literal["stopping", "intent", "next", "contact", "system"]
 Quality: TypeAlias = Literal["good", "degraded", "stale"]
@@ -119,9 +119,9 @@ class PredictionEvent:
 
 @dataclass(frozen=True, slots=True)
 class RefusalEvent:
-    """A sample that the gate refused: which input, a word for it, and its values."""
+    """A sample that was refused: which input or object, a word for it, and its values."""
 
-    input: InputName
+    input: str
     reason: str
     detail: str
 

@@ -2,13 +2,15 @@
 
 Each step takes every sample that arrived, in stamp order, and lets it update the operator's
 intention and the arm's motion. Then, if a new position came, the newest state is swept once
-for each forecast, judged zone by zone, and alarmed. A step without a new position only lets
-time pass: silence is noticed, active alerts are repeated.
+for each forecast, judged zone by zone, and alarmed. Objects that move are swept where they
+are now, and at least ten times a second, since they come nearer to an arm that stands too. Any
+other step only lets time pass: silence is noticed, active alerts are repeated.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,7 +32,9 @@ from rampe_guard.core.inputs import Accepted, InputGate, Rejection
 from rampe_guard.core.intention import Intention
 from rampe_guard.core.levels import LevelRules, worst
 from rampe_guard.core.monitor import Health, InputMonitor, Status
+from rampe_guard.core.moving import MovingObjects
 from rampe_guard.core.rampe import Rampe
+from rampe_guard.core.scene import SolidObject
 from rampe_guard.core.types import (
     ActuatorSample,
     Certificate,
@@ -42,6 +46,9 @@ from rampe_guard.core.types import (
     ZoneSweep,
 )
 from rampe_guard.core.velocity import VelocityEstimator
+
+_LOOK_S = 0.1
+"""Longest time between two sweeps while the scene has objects that move [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +73,7 @@ class Guard:
         sweeper: geometry.
         start_s: time at which monitoring begins, on the clock of ``now_s``.
         boot_id: makes alert ids unique across restarts.
+        moving: the objects of the scene whose poses come from a key.
     """
 
     def __init__(
@@ -75,12 +83,14 @@ class Guard:
         sweeper: PathSweeper,
         start_s: float,
         boot_id: str = "offline",
+        moving: Sequence[SolidObject] = (),
     ) -> None:
         alerts = config.alerts
         tail = max(alerts.caution_probability - alerts.deadband_probability, 0.02)
         self._sweeper = sweeper
         self._gate = InputGate(config.actuators, limits, config.inputs, config.axes)
         self._monitor = InputMonitor(config.inputs, start_s)
+        self._moving = MovingObjects(moving, config.inputs)
         self._intention = Intention(config, limits)
         self._velocity = VelocityEstimator(np.array([a.max_velocity for a in config.actuators]))
         self._forecaster = Forecaster(config.actuators, limits, config.stopping.reaction_s, tail)
@@ -90,6 +100,7 @@ class Guard:
         self._newest: ActuatorSample | None = None
         self._machine_s = 0.0
         self._sweeps: tuple[SweepSummary, ...] = ()
+        self._swept_s = start_s
 
     @property
     def rampe(self) -> Rampe:
@@ -110,13 +121,17 @@ class Guard:
         before = self._newest
         for sample in _in_stamp_order(inputs):
             events += self._taught(self._take(sample, now_s))
-        health = self._monitor.health(now_s)
+        fresh, refused = self._moving.take(inputs, now_s)
+        events += refused
+        health = self._health(now_s)
         moment = self._moment(health, now_s)
         events += self._annunciator.system(_system_evidence(health), moment)
         if health.status is Status.NOT_MONITORING:
             self._intention.interrupt()
             events += self._annunciator.freeze(moment)
-        elif self._newest is not None and self._newest is not before:
+        elif self._newest is not None and (
+            self._newest is not before or fresh or self._must_look(now_s)
+        ):
             events += self._evaluate(self._newest, now_s)
         else:
             events += self._annunciator.repeats(moment)
@@ -124,12 +139,12 @@ class Guard:
 
     def acknowledge(self, alert_id: str, who: str, now_s: float) -> tuple[Event, ...]:
         """Someone has seen an alert; empty if no alert of that id waits for it."""
-        moment = self._moment(self._monitor.health(now_s), now_s)
+        moment = self._moment(self._health(now_s), now_s)
         return tuple(self._annunciator.acknowledge(alert_id, who, moment))
 
     def snapshot(self, now_s: float) -> Snapshot:
         """The present state."""
-        moment = self._moment(health := self._monitor.health(now_s), now_s)
+        moment = self._moment(health := self._health(now_s), now_s)
         return Snapshot(
             health=health,
             position=None if self._newest is None else self._newest.position,
@@ -155,6 +170,7 @@ class Guard:
             self._refuse(moved.input, moved.reason, now_s)
             return [RefusalEvent(moved.input, moved.reason, moved.detail)]
         self._monitor.accept("actuators", sample.arrival_s)
+        self._moving.follow(sample, restarted=moved.restarted)
         self._restart(moved)
         if self._newest is not None and not moved.restarted:
             self._machine_s += moved.sample.stamp_s - self._newest.stamp_s
@@ -191,11 +207,18 @@ class Guard:
         evidence: dict[str, list[Evidence]] = {}
         sweeps = []
         open_zones: frozenset[str] | None = None  # all
+        placed = self._moving.placements(now_s)
+        self._swept_s = now_s
         for forecast in forecasts:
-            result = self._sweeper.sweep(q, forecast.displacement, clearance=False, only=open_zones)
-            if result.certificate is Certificate.UNKNOWN:
-                self._monitor.sweep_unknown(now_s)
-            for zone in result.zones:
+            result = self._sweeper.sweep(
+                q, forecast.displacement, clearance=False, only=open_zones, placed=placed
+            )
+            for found_zone in result.zones:
+                zone = found_zone
+                if zone.certificate is Certificate.UNKNOWN and placed.get(zone.zone, True):
+                    self._monitor.sweep_unknown(now_s)  # what is not placed has a reason already
+                if self._moving.restless(zone.zone, now_s):
+                    zone = replace(zone, closing=True)  # whatever the arm does
                 shown = self._annunciator.shown(zone.zone)
                 found = self._rules.judge(forecast, zone, shown, stop_s)
                 evidence.setdefault(zone.zone, []).append(found)
@@ -207,9 +230,19 @@ class Guard:
                 if worst(all_found).level < Level.IMMINENT
             )
         self._sweeps = tuple(sweeps)
-        moment = self._moment(self._monitor.health(now_s), now_s)
+        moment = self._moment(self._health(now_s), now_s)
         alerts = self._annunciator.update({z: worst(e) for z, e in evidence.items()}, moment)
         return [*alerts, *self._intention.update(q, self._sweeps, now_s)]
+
+    def _must_look(self, now_s: float) -> bool:
+        # a hair less than the period, so that it survives the rounding of ticks
+        return bool(self._moving) and now_s - self._swept_s >= _LOOK_S - 1e-6
+
+    def _health(self, now_s: float) -> Health:
+        if not self._moving:
+            return self._monitor.health(now_s)
+        health = self._monitor.health(now_s, self._moving.weaknesses(now_s))
+        return replace(health, objects=self._moving.health(now_s))
 
     def _moment(self, health: Health, now_s: float) -> Moment:
         newest = self._newest

@@ -9,14 +9,29 @@ seen, and then taken up anew.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Generic, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
 from rampe_guard.core.config import ActuatorConfig, InputConfig
 from rampe_guard.core.types import ActuatorSample, FloatArray, InputName, JoystickSample
 
-S = TypeVar("S", JoystickSample, ActuatorSample)
+
+class Stamped(Protocol):
+    """A sample with the time of its measurement and that of its arrival [s]."""
+
+    @property
+    def stamp_s(self) -> float:
+        """On the sender's clock."""
+        ...
+
+    @property
+    def arrival_s(self) -> float:
+        """On ours."""
+        ...
+
+
+S = TypeVar("S", bound=Stamped)
 
 AXIS_SLACK = 0.05
 """Joysticks overshoot a little at their ends; more is another unit or another column."""
@@ -37,6 +52,14 @@ class Rejection:
 
 
 @dataclass(frozen=True, slots=True)
+class Fault:
+    """What is wrong with a sample: a word for the counter, values for the log."""
+
+    reason: str
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
 class Accepted(Generic[S]):
     """A sample fit for use; ``restarted`` when it does not continue the one before it."""
 
@@ -44,18 +67,27 @@ class Accepted(Generic[S]):
     restarted: bool = False
 
 
-class _Continuity(Generic[S]):
-    """Does a sample continue the last good one, or has the sender started anew?"""
+class Continuity(Generic[S]):
+    """Does a sample continue the last good one, or has the sender started anew?
 
-    def __init__(self, name: InputName, patience_s: float, config: InputConfig) -> None:
-        self._name: InputName = name
+    Args:
+        patience_s: how long a sender that started anew is refused [s].
+        max_stamp_jump_s: largest step of a stamp beyond the time that really passed [s].
+        speed_slack: how many times its top speed an actuator may seem to have.
+    """
+
+    def __init__(
+        self, patience_s: float, max_stamp_jump_s: float, speed_slack: float = 1.0
+    ) -> None:
         self._patience_s = patience_s
-        self._config = config
+        self._max_stamp_jump_s = max_stamp_jump_s
+        self._speed_slack = speed_slack
         self._good: S | None = None
         self._suspect: S | None = None
         self._suspect_since_s = 0.0
 
-    def check(self, sample: S, speed: FloatArray | None = None) -> Accepted[S] | Rejection:
+    def check(self, sample: S, speed: FloatArray | None = None) -> Accepted[S] | Fault:
+        """Whether it does; ``speed`` are top speeds (n,) by which positions are judged too."""
         if self._good is None:
             self._good = sample
             return Accepted(sample)
@@ -71,30 +103,24 @@ class _Continuity(Generic[S]):
             return Accepted(sample, restarted=True)
         return broken
 
-    def _break(self, old: S, new: S, speed: FloatArray | None) -> Rejection | None:
+    def _break(self, old: S, new: S, speed: FloatArray | None) -> Fault | None:
         step = new.stamp_s - old.stamp_s
         if step <= 0.0:
-            return Rejection(
-                self._name, "stamp_back", f"stamp {new.stamp_s:.6g} after {old.stamp_s:.6g}"
-            )
+            return Fault("stamp_back", f"stamp {new.stamp_s:.6g} after {old.stamp_s:.6g}")
         passed = new.arrival_s - old.arrival_s
-        if step - passed > self._config.max_stamp_jump_s:
-            return Rejection(
-                self._name,
-                "stamp_jump",
-                f"stamp went {step:.3g} s ahead while {passed:.3g} s passed",
-            )
-        if speed is None or not isinstance(new, ActuatorSample):
+        if step - passed > self._max_stamp_jump_s:
+            return Fault("stamp_jump", f"stamp went {step:.3g} s ahead while {passed:.3g} s passed")
+        if speed is None or not (
+            isinstance(old, ActuatorSample) and isinstance(new, ActuatorSample)
+        ):
             return None
         moved = np.abs(new.position - old.position)
         burst = min(max(step, _MIN_STEP_S), _BURST_S)
         rest = max(step - _BURST_S, 0.0)
-        reach = speed * (self._config.speed_slack * burst + _LONG_SLACK * rest)
+        reach = speed * (self._speed_slack * burst + _LONG_SLACK * rest)
         if (moved > reach).any():
             j = int(np.argmax(moved - reach))
-            return Rejection(
-                self._name, "position_jump", f"actuator {j} moved {moved[j]:.4g} in {step:.3g} s"
-            )
+            return Fault("position_jump", f"actuator {j} moved {moved[j]:.4g} in {step:.3g} s")
         return None
 
 
@@ -122,9 +148,10 @@ class InputGate:
         width = np.where(bounded, np.where(bounded, limits[:, 1] - limits[:, 0], 0.0), 0.0)
         self._low = limits[:, 0] - config.position_slack * width
         self._high = limits[:, 1] + config.position_slack * width
-        self._joystick = _Continuity[JoystickSample]("joystick", config.joystick_timeout_s, config)
-        self._actuators = _Continuity[ActuatorSample](
-            "actuators", config.actuators_timeout_s, config
+        jump_s = config.max_stamp_jump_s
+        self._joystick = Continuity[JoystickSample](config.joystick_timeout_s, jump_s)
+        self._actuators = Continuity[ActuatorSample](
+            config.actuators_timeout_s, jump_s, config.speed_slack
         )
 
     def joystick(self, sample: JoystickSample) -> Accepted[JoystickSample] | Rejection:
@@ -139,7 +166,7 @@ class InputGate:
             j = int(np.argmax(size))
             return Rejection("joystick", "axis_out_of_range", f"axis {j} is {axes[j]:.4g}")
         clipped = replace(sample, axes=np.clip(axes, -1.0, 1.0))
-        return self._joystick.check(clipped)
+        return _named("joystick", self._joystick.check(clipped))
 
     def actuators(self, sample: ActuatorSample) -> Accepted[ActuatorSample] | Rejection:
         """Check one actuator sample."""
@@ -158,4 +185,10 @@ class InputGate:
                 "position_out_of_range",
                 f"{self._names[j]} is {q[j]:.4g}, limits {self._low[j]:.4g} to {self._high[j]:.4g}",
             )
-        return self._actuators.check(sample, self._speed)
+        return _named("actuators", self._actuators.check(sample, self._speed))
+
+
+def _named(name: InputName, verdict: Accepted[S] | Fault) -> Accepted[S] | Rejection:
+    if isinstance(verdict, Fault):
+        return Rejection(name, verdict.reason, verdict.detail)
+    return verdict

@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 from collections import Counter, deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -15,7 +16,7 @@ from rampe_guard.core.config import InputConfig
 from rampe_guard.core.screening import FAULTS
 from rampe_guard.core.types import InputName
 
-_RECENT_S = 5.0
+RECENT_S = 5.0
 """How long a refusal or an unknown sweep keeps the status degraded [s]."""
 _PLAUSIBLE_WINDOW_S = 10.0
 _IMPLAUSIBLE_SHARE = 0.1
@@ -35,11 +36,36 @@ class Status(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Reason:
-    """Why the status is not ok: a code, the input it concerns (if one), words with values."""
+    """Why the status is not ok: a code, the input it concerns (if one), words with values.
+
+    ``key`` is the key of the object that it concerns, if it is one.
+    """
 
     code: str
     input: InputName | None
     text: str
+    key: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectHealth:
+    """The poses of one object that moves.
+
+    Attributes:
+        name: of its zone.
+        key: of its poses.
+        age_s: of the newest accepted pose [s], None before it.
+        grown_m: how far it may have moved since [m], None where nobody knows where it is.
+        accepted: poses accepted.
+        rejected: messages refused, by reason.
+    """
+
+    name: str
+    key: str
+    age_s: float | None
+    grown_m: float | None
+    accepted: int
+    rejected: dict[str, int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +81,7 @@ class Health:
     accepted: dict[InputName, int]
     rejected: dict[tuple[InputName, str], int]
     starting: bool = False
+    objects: tuple[ObjectHealth, ...] = ()
 
 
 class InputMonitor:
@@ -117,10 +144,10 @@ class InputMonitor:
         self._window.append((at_s, good))
         self._bad += not good
 
-    def health(self, now_s: float) -> Health:
-        """Status at ``now_s``."""
+    def health(self, now_s: float, more: Sequence[Reason] = ()) -> Health:
+        """Status at ``now_s``; ``more`` are weaknesses that others have found."""
         blind = [r for r in (self._silence("actuators", now_s), self._joystick(now_s)) if r]
-        weak = self._weaknesses(now_s)
+        weak = [*more, *self._weaknesses(now_s)]
         status = Status.NOT_MONITORING if blind else Status.DEGRADED if weak else Status.OK
         ages: dict[InputName, float | None] = {
             name: None if last is None else max(now_s - last, 0.0)
@@ -160,7 +187,7 @@ class InputMonitor:
             text = "no joystick message yet: only the stopping forecast protects"
             found.append(Reason("joystick_unknown", "joystick", text))
         for (name, reason), at in sorted(self._recent.items()):
-            if now_s - at <= _RECENT_S:
+            if now_s - at <= RECENT_S:
                 count = self._rejected[name, reason]
                 text = f"{count} {name} messages refused: {reason}"
                 found.append(Reason(f"{name}_{reason}", name, text))
@@ -173,7 +200,7 @@ class InputMonitor:
                 f"the last primitives cannot be what they seem ({words}): wrong column or sensor?"
             )
             found.append(Reason("primitives_refused", "actuators", text))
-        if self._unknown_s is not None and now_s - self._unknown_s <= _RECENT_S:
+        if self._unknown_s is not None and now_s - self._unknown_s <= RECENT_S:
             text = "a sweep ran out of its budget and was taken as contact"
             found.append(Reason("sweep_unknown", None, text))
         return found

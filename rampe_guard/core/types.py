@@ -46,13 +46,14 @@ class ActuatorSample:
 class ObjectSample:
     """One pose message of the keyed object ``name``: its own frame in the world (4, 4) [m].
 
-    ``stamp_s`` None: the message had no stamp, and its arrival counts.
+    Not ``stamped``: the message had no stamp, and ``stamp_s`` is its arrival.
     """
 
     name: str
     pose: FloatArray
-    stamp_s: float | None
+    stamp_s: float
     arrival_s: float
+    stamped: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rampe_guard import __version__, wire
-from rampe_guard.core.monitor import Health, Status
-from rampe_guard.core.types import FloatArray, InputName, PathSweeper, Placement, SweepResult
+from rampe_guard.core.monitor import Health, ObjectHealth, Status
+from rampe_guard.core.types import FloatArray, PathSweeper, Placement, SweepResult
 from rampe_guard.settings import Site
 
 _TIMES = 1000
@@ -71,21 +71,21 @@ class Rates:
     """Messages per second, from counts at past heartbeats."""
 
     def __init__(self) -> None:
-        self._past: deque[tuple[float, dict[InputName, int]]] = deque()
+        self._past: deque[tuple[float, dict[str, int]]] = deque()
 
-    def update(self, now_s: float, accepted: dict[InputName, int]) -> wire.InputRates:
-        """Rates [1/s] over the last two seconds."""
-        self._past.append((now_s, accepted))
+    def update(self, now_s: float, accepted: Mapping[str, int]) -> Callable[[str], float | None]:
+        """Rates [1/s] over the last two seconds, by name; None at the first heartbeat."""
+        self._past.append((now_s, dict(accepted)))
         while self._past[0][0] < now_s - _RATE_WINDOW_S and len(self._past) > 1:
             self._past.popleft()
         then_s, then = self._past[0]
-        if now_s <= then_s:
-            return wire.InputRates(joystick=None, actuators=None)
 
-        def rate(name: InputName) -> float:
+        def rate(name: str) -> float | None:
+            if now_s <= then_s:
+                return None
             return (accepted.get(name, 0) - then.get(name, 0)) / (now_s - then_s)
 
-        return wire.InputRates(joystick=rate("joystick"), actuators=rate("actuators"))
+        return rate
 
 
 @dataclass
@@ -109,6 +109,7 @@ class Pulse:
         self.sweep_ms = Durations()
         self.tick = 0
         self._rates = Rates()
+        self._object_rates = Rates()
         self._seq = 0
 
     def beat(
@@ -123,7 +124,7 @@ class Pulse:
         self._seq += 1
         keys = {"joystick": self.site.keys.joystick, "actuators": self.site.keys.actuators}
         reasons = [
-            wire.Reason(code=r.code, text=r.text, key=keys[r.input] if r.input else None)
+            wire.Reason(code=r.code, text=r.text, key=keys[r.input] if r.input else r.key)
             for r in health.reasons
         ]
         more = list(extra)
@@ -131,6 +132,8 @@ class Pulse:
         rejected: dict[str, dict[str, int]] = {}
         for (name, reason), count in health.rejected.items():
             rejected.setdefault(name, {})[reason] = count
+        accepted = {str(name): count for name, count in health.accepted.items()}
+        rate = self._rates.update(now_s, accepted)
         return wire.Heartbeat(
             boot_id=self.boot_id,
             seq=self._seq,
@@ -141,9 +144,10 @@ class Pulse:
             input_age_s=wire.InputAges(
                 joystick_s=health.ages_s["joystick"], actuators_s=health.ages_s["actuators"]
             ),
-            rates_hz=self._rates.update(now_s, health.accepted),
-            accepted={str(k): v for k, v in health.accepted.items()},
+            rates_hz=wire.InputRates(joystick=rate("joystick"), actuators=rate("actuators")),
+            accepted=accepted,
             rejected=rejected,
+            objects=self._objects(health.objects, now_s),
             primitives=primitives,
             drops=overruns,
             loop_ms=self.loop_ms.quantiles(),
@@ -154,4 +158,23 @@ class Pulse:
             version=__version__,
             published_unix_s=self.unix_s(now_s),
             uptime_s=now_s - self.start_s,
+        )
+
+    def _objects(
+        self, objects: Iterable[ObjectHealth], now_s: float
+    ) -> tuple[wire.ObjectInput, ...]:
+        objects = tuple(objects)
+        rate = self._object_rates.update(now_s, {o.name: o.accepted for o in objects})
+        return tuple(
+            wire.ObjectInput(
+                name=o.name,
+                key=o.key,
+                placed=o.grown_m is not None,
+                age_s=o.age_s,
+                grown_m=o.grown_m,
+                rate_hz=rate(o.name),
+                accepted=o.accepted,
+                rejected=o.rejected,
+            )
+            for o in objects
         )

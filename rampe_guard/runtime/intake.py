@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from rampe_guard import wire
-from rampe_guard.core.types import ActuatorSample, InputName, Inputs, JoystickSample
+from rampe_guard.core.types import (
+    ActuatorSample,
+    FloatArray,
+    InputName,
+    Inputs,
+    JoystickSample,
+    ObjectSample,
+)
 from rampe_guard.errors import MessageError
 from rampe_guard.runtime.say import Sayer
 from rampe_guard.runtime.zenoh_io import Bus, Message
@@ -13,7 +21,7 @@ from rampe_guard.settings import Site
 
 
 class Intake:
-    """Both inputs of a machine, drained by the worker."""
+    """Both inputs of a machine and the poses of objects that move, drained by the worker."""
 
     def __init__(self, bus: Bus, site: Site, say: Sayer) -> None:
         keys = site.keys
@@ -21,12 +29,18 @@ class Intake:
         self._say = say
         self._joystick = bus.inbox(keys.joystick)
         self._actuators = bus.inbox(keys.actuators)
+        self._objects = [
+            (item.name, item.key, bus.inbox(item.key))
+            for item in site.scene.moving
+            if item.key is not None
+        ]
         self._alive = None if keys.joystick_alive is None else bus.liveness(keys.joystick_alive)
 
     @property
     def overruns(self) -> int:
         """How often an input came faster than it was drained."""
-        return self._joystick.overruns + self._actuators.overruns
+        inboxes = (self._joystick, self._actuators, *(inbox for _, _, inbox in self._objects))
+        return sum(inbox.overruns for inbox in inboxes)
 
     def collect(self, now_s: float) -> Inputs:
         """Everything that arrived.
@@ -49,7 +63,22 @@ class Intake:
             except MessageError as error:
                 self._refuse("actuators", message, error, refused)
         alive = None if self._alive is None else self._alive.poll()
-        return Inputs(tuple(levers), tuple(positions), tuple(refused), alive)
+        poses, lost = self._poses(now_s)
+        return Inputs(tuple(levers), tuple(positions), tuple(refused), alive, poses, lost)
+
+    def _poses(self, now_s: float) -> tuple[tuple[ObjectSample, ...], tuple[tuple[str, str], ...]]:
+        """Poses of all objects that move, and (object, reason) of what was refused."""
+        poses: list[ObjectSample] = []
+        refused: list[tuple[str, str]] = []
+        for name, key, inbox in self._objects:
+            for message in inbox.drain():
+                try:
+                    _exact(message, key)
+                    poses.append(_placed(name, wire.decode_object_pose(message.payload), now_s))
+                except MessageError as error:
+                    refused.append((name, error.reason))
+                    self._warn(f"object {name}:{error.reason}", message, error)
+        return tuple(poses), tuple(refused)
 
     def _lever(self, message: Message, now_s: float) -> JoystickSample:
         _exact(message, self._site.keys.joystick)
@@ -72,7 +101,26 @@ class Intake:
         refused: list[tuple[InputName, str]],
     ) -> None:
         refused.append((name, error.reason))
-        self._say.warn(f"{name}:{error.reason}", f"{message.key}: refused: {error}")
+        self._warn(f"{name}:{error.reason}", message, error)
+
+    def _warn(self, kind: str, message: Message, error: MessageError) -> None:
+        self._say.warn(kind, f"{message.key}: refused: {error}")
+
+
+def _placed(name: str, message: wire.ObjectPose, now_s: float) -> ObjectSample:
+    stamped = message.stamp is not None
+    stamp_s = now_s if message.stamp is None else message.stamp
+    pose = np.eye(4)
+    pose[:3, :3] = _rotation(message)
+    pose[:3, 3] = message.xyz_m
+    return ObjectSample(name, pose, stamp_s, now_s, stamped=stamped)
+
+
+def _rotation(message: wire.ObjectPose) -> FloatArray:
+    """Rotation matrix (3, 3); ``rpy`` turns about the fixed axes, as in URDF."""
+    if message.quaternion_xyzw is not None:
+        return Rotation.from_quat(message.quaternion_xyzw).as_matrix()
+    return Rotation.from_euler("xyz", message.rpy_rad or (0.0, 0.0, 0.0)).as_matrix()
 
 
 def _exact(message: Message, key: str) -> None:

@@ -78,8 +78,7 @@ class Worker:
         while not stopped():
             now_s = time.monotonic()
             inputs = self._intake.collect(now_s)
-            arrived = inputs.joystick or inputs.actuators or inputs.rejected
-            if arrived or now_s - last_step_s >= IDLE_STEP_S:
+            if arrived(inputs) or now_s - last_step_s >= IDLE_STEP_S:
                 last_step_s = now_s
                 self._step(inputs, now_s)
             if now_s - last_beat_s >= _BEAT_S:
@@ -156,6 +155,12 @@ class Worker:
             self._publish(event, None)
             if isinstance(event, AlertEvent):
                 request.reply(wire.encode(self._scribe.alert(event)))
+
+
+def arrived(inputs: Inputs) -> bool:
+    """Anything at all came, good or refused."""
+    lists = (inputs.joystick, inputs.actuators, inputs.rejected)
+    return any((*lists, inputs.objects, inputs.objects_rejected))
 
 
 def _unix_s(now_s: float) -> float:

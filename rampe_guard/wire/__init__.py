@@ -8,12 +8,14 @@ site's units.
 from rampe_guard.wire.ack import Ack
 from rampe_guard.wire.alert import Alert
 from rampe_guard.wire.codec import MAX_PAYLOAD_BYTES, decode, encode
-from rampe_guard.wire.health import Heartbeat, InputAges, InputRates, Quantiles, Reason
+from rampe_guard.wire.health import Heartbeat, InputAges, InputRates, ObjectInput, Quantiles, Reason
 from rampe_guard.wire.inputs import (
     ActuatorsMessage,
     JoystickMessage,
+    ObjectPose,
     decode_actuators,
     decode_joystick,
+    decode_object_pose,
 )
 from rampe_guard.wire.prediction import Endpoint, Prediction, PredictionSweep
 from rampe_guard.wire.schema import json_schemas
@@ -32,6 +34,8 @@ __all__ = [
     "InputAges",
     "InputRates",
     "JoystickMessage",
+    "ObjectInput",
+    "ObjectPose",
     "Prediction",
     "PredictionSweep",
     "Quantiles",
@@ -43,6 +47,7 @@ __all__ = [
     "decode",
     "decode_actuators",
     "decode_joystick",
+    "decode_object_pose",
     "decode_sweep_request",
     "encode",
     "json_schemas",

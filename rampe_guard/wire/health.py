@@ -43,6 +43,28 @@ class Quantiles(Message, frozen=True, kw_only=True):
     p99: Annotated[float, Meta(description="99th percentile [ms].")]
 
 
+class ObjectInput(Message, frozen=True, kw_only=True):
+    """The poses of one object that moves."""
+
+    name: Annotated[str, Meta(description="Name of its zone.")]
+    key: Annotated[str, Meta(description="The Zenoh key of its poses.")]
+    placed: Annotated[
+        bool, Meta(description="Whether it is known where it is; else it is taken as contact.")
+    ]
+    age_s: Annotated[
+        float | None, Meta(description="Age of the newest accepted pose [s]; null before it.")
+    ]
+    grown_m: Annotated[
+        float | None,
+        Meta(description="How far it may have moved since [m]; null where it is not placed."),
+    ]
+    rate_hz: Annotated[float | None, Meta(description="Accepted poses [1/s].")]
+    accepted: Annotated[int, Meta(description="Poses accepted since the boot.")]
+    rejected: Annotated[
+        dict[str, int], Meta(description="Messages refused since the boot, by reason.")
+    ]
+
+
 class Heartbeat(Message, frozen=True, kw_only=True):
     """Health of the guard, sent from its worker loop."""
 
@@ -69,6 +91,9 @@ class Heartbeat(Message, frozen=True, kw_only=True):
         dict[str, dict[str, int]],
         Meta(description="Messages refused since the boot, by input, then reason."),
     ]
+    objects: Annotated[
+        tuple[ObjectInput, ...], Meta(description="Objects that move, in the order of the scene.")
+    ] = ()
     primitives: Annotated[
         dict[str, int],
         Meta(description="Finished primitives since the boot: learned, or by why they were not."),

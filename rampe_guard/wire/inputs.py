@@ -1,12 +1,14 @@
-"""What arrives: joystick axes and actuator positions, checked against the site.
+"""What arrives: joystick axes, actuator positions and poses of objects, checked against the site.
 
 A message is taken whole or refused whole, with one of these reasons: ``too_large``,
-``bad_json``, ``not_finite``, ``wrong_length``, ``axis_out_of_range``, ``bad_name``.
+``bad_json``, ``not_finite``, ``wrong_length``, ``axis_out_of_range``, ``bad_name``,
+``bad_rotation``.
 """
 
 from __future__ import annotations
 
-from typing import Annotated
+import math
+from typing import Annotated, Any
 
 from msgspec import Meta
 
@@ -19,11 +21,13 @@ MAX_VALUE = 1e6
 MAX_STAMP_S = 1e12
 """Larger stamps are milli- or nanoseconds."""
 _MAX_AXES = 64
+_UNIT_SLACK = 1e-3
+"""How far from 1 the length of a quaternion may be: rounded digits, not another quantity."""
 
 _Stamp = Annotated[
     float | None,
     Meta(
-        description="Time of the measurement [s], one clock for both inputs; null or absent: "
+        description="Time of the measurement [s], one clock for all inputs; null or absent: "
         "the arrival counts.",
         extra_json_schema={"minimum": -MAX_STAMP_S, "maximum": MAX_STAMP_S},
     ),
@@ -53,6 +57,34 @@ class ActuatorsMessage(Message, frozen=True, kw_only=True):
     name: Annotated[
         tuple[str, ...] | None,
         Meta(description="Actuator names, where the arrays are in another order."),
+    ] = None
+    stamp: _Stamp = None
+
+
+def _count(number: int) -> dict[str, Any]:
+    return {"minItems": number, "maxItems": number}
+
+
+class ObjectPose(Message, frozen=True, kw_only=True):
+    """Where an object that moves stands; exactly one of both rotations is given."""
+
+    xyz_m: Annotated[
+        tuple[float, ...],
+        Meta(description="Origin of its own frame in the world [m].", extra_json_schema=_count(3)),
+    ]
+    rpy_rad: Annotated[
+        tuple[float, ...] | None,
+        Meta(
+            description="Rotation about the fixed x, then y, then z axis [rad].",
+            extra_json_schema=_count(3),
+        ),
+    ] = None
+    quaternion_xyzw: Annotated[
+        tuple[float, ...] | None,
+        Meta(
+            description="Rotation as a quaternion x, y, z, w of length 1.",
+            extra_json_schema=_count(4),
+        ),
     ] = None
     stamp: _Stamp = None
 
@@ -92,6 +124,33 @@ def decode_actuators(payload: bytes, names: tuple[str, ...]) -> ActuatorsMessage
         position = tuple(position[i] for i in order)
         velocity = None if velocity is None else tuple(velocity[i] for i in order)
     return ActuatorsMessage(position=position, velocity=velocity, stamp=message.stamp)
+
+
+def decode_object_pose(payload: bytes) -> ObjectPose:
+    """The pose, its quaternion (if it has one) of length 1 to the last digit.
+
+    Raises:
+        MessageError: with its reason, when the message cannot be trusted.
+    """
+    message = decode(payload, ObjectPose, limit=MAX_PAYLOAD_BYTES)
+    _check_stamp(message.stamp)
+    xyz_m = _checked("xyz_m", message.xyz_m, 3)
+    rpy, quaternion = message.rpy_rad, message.quaternion_xyzw
+    if (rpy is None) is (quaternion is None):
+        given = "neither" if rpy is None else "both"
+        raise MessageError("bad_rotation", f"{given} of rpy_rad and quaternion_xyzw; give one")
+    if rpy is not None:
+        rpy = _checked("rpy_rad", rpy, 3)
+    if quaternion is not None:
+        quaternion = _unit(_checked("quaternion_xyzw", quaternion, 4))
+    return ObjectPose(xyz_m=xyz_m, rpy_rad=rpy, quaternion_xyzw=quaternion, stamp=message.stamp)
+
+
+def _unit(quaternion: tuple[float, ...]) -> tuple[float, ...]:
+    length = math.hypot(*quaternion)
+    if abs(length - 1.0) > _UNIT_SLACK:
+        raise MessageError("bad_rotation", f"quaternion_xyzw has length {length:.6g}, not 1")
+    return tuple(value / length for value in quaternion)
 
 
 def _check_stamp(stamp: float | None) -> None:

@@ -9,7 +9,7 @@ import msgspec
 from rampe_guard.wire.ack import Ack
 from rampe_guard.wire.alert import Alert
 from rampe_guard.wire.health import Heartbeat
-from rampe_guard.wire.inputs import ActuatorsMessage, JoystickMessage
+from rampe_guard.wire.inputs import ActuatorsMessage, JoystickMessage, ObjectPose
 from rampe_guard.wire.prediction import Prediction
 from rampe_guard.wire.state import State
 from rampe_guard.wire.sweep import SweepReply, SweepRequest
@@ -19,6 +19,7 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _TAKEN: dict[str, type[msgspec.Struct]] = {
     "rampe.joystick.v1": JoystickMessage,
     "rampe.actuators.v1": ActuatorsMessage,
+    "rampe.object_pose.v1": ObjectPose,
     "rampe.ack.v1": Ack,
     "rampe.sweep_request.v1": SweepRequest,
 }
