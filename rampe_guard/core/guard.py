@@ -49,6 +49,9 @@ from rampe_guard.core.velocity import VelocityEstimator
 
 _LOOK_S = 0.1
 """Longest time between two sweeps while the scene has objects that move [s]."""
+_FRESH_S = 0.02
+"""Shortest time from a sweep to one that only a new pose of an object asks for [s]: however many
+objects tell of themselves, and however often, they cost at most so many sweeps."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +104,7 @@ class Guard:
         self._machine_s = 0.0
         self._sweeps: tuple[SweepSummary, ...] = ()
         self._swept_s = start_s
+        self._poses_came = False
 
     @property
     def rampe(self) -> Rampe:
@@ -123,15 +127,14 @@ class Guard:
             events += self._taught(self._take(sample, now_s))
         fresh, refused = self._moving.take(inputs, now_s)
         events += refused
+        self._poses_came |= fresh
         health = self._health(now_s)
         moment = self._moment(health, now_s)
         events += self._annunciator.system(_system_evidence(health), moment)
         if health.status is Status.NOT_MONITORING:
             self._intention.interrupt()
             events += self._annunciator.freeze(moment)
-        elif self._newest is not None and (
-            self._newest is not before or fresh or self._must_look(now_s)
-        ):
+        elif self._newest is not None and (self._newest is not before or self._must_look(now_s)):
             events += self._evaluate(self._newest, now_s)
         else:
             events += self._annunciator.repeats(moment)
@@ -208,7 +211,7 @@ class Guard:
         sweeps = []
         open_zones: frozenset[str] | None = None  # all
         placed = self._moving.placements(now_s)
-        self._swept_s = now_s
+        self._swept_s, self._poses_came = now_s, False
         for forecast in forecasts:
             result = self._sweeper.sweep(
                 q, forecast.displacement, clearance=False, only=open_zones, placed=placed
@@ -236,7 +239,8 @@ class Guard:
 
     def _must_look(self, now_s: float) -> bool:
         # a hair less than the period, so that it survives the rounding of ticks
-        return bool(self._moving) and now_s - self._swept_s >= _LOOK_S - 1e-6
+        since_s = now_s - self._swept_s + 1e-6
+        return bool(self._moving) and since_s >= (_FRESH_S if self._poses_came else _LOOK_S)
 
     def _health(self, now_s: float) -> Health:
         if not self._moving:
