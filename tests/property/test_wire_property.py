@@ -11,7 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rampe_guard.errors import MessageError
-from rampe_guard.wire import MAX_TEXT, alert_text, decode_actuators, decode_joystick
+from rampe_guard.wire import (
+    MAX_TEXT,
+    alert_text,
+    decode_actuators,
+    decode_joystick,
+    decode_object_pose,
+)
 
 T = TypeVar("T")
 
@@ -22,6 +28,7 @@ REASONS = {
     "not_finite",
     "axis_out_of_range",
     "bad_name",
+    "bad_rotation",
 }
 NAMES = ("swing", "boom", "stick")
 
@@ -33,7 +40,9 @@ json_values = st.recursive(
     lambda inner: st.lists(inner, max_size=4),
     max_leaves=6,
 )
-fields = st.sampled_from(["stamp", "axes", "position", "velocity", "name", "other"])
+fields = st.sampled_from(
+    ["stamp", "axes", "position", "velocity", "name", "xyz_m", "rpy_rad", "quaternion_xyzw", "x"]
+)
 objects = st.dictionaries(fields, json_values, max_size=6).map(lambda o: json.dumps(o).encode())
 payloads = st.binary(max_size=200) | objects
 unit = st.floats(-1.0, 1.0)
@@ -67,6 +76,35 @@ def test_actuator_bytes_become_a_sound_message_or_a_reason(payload: bytes) -> No
         arrays = [message.position, message.velocity or message.position]
         assert all(len(values) == len(NAMES) for values in arrays)
         assert all(abs(value) <= 1e6 for values in arrays for value in values)
+
+
+@given(payload=payloads)
+def test_pose_bytes_become_a_sound_pose_or_a_reason(payload: bytes) -> None:
+    message = taken(lambda: decode_object_pose(payload))
+    if message is not None:
+        assert all(abs(value) <= 1e6 for value in message.xyz_m)
+        turn = message.quaternion_xyzw
+        assert (turn is None) is not (message.rpy_rad is None)
+        assert turn is None or math.isclose(math.hypot(*turn), 1.0)
+
+
+@given(
+    xyz=st.lists(positions, min_size=3, max_size=3),
+    turn=st.lists(unit, min_size=4, max_size=4).filter(lambda q: math.hypot(*q) > 0.01),
+    stamp=st.none() | st.floats(0, 1e10),
+)
+def test_every_sound_pose_is_taken(
+    xyz: list[float], turn: list[float], stamp: float | None
+) -> None:
+    length = math.hypot(*turn)
+    quaternion = [value / length for value in turn]
+    sent = {"xyz_m": xyz, "quaternion_xyzw": quaternion, "stamp": stamp}
+    message = decode_object_pose(json.dumps(sent).encode())
+    assert message.xyz_m == tuple(xyz)
+    assert message.stamp == stamp
+    assert message.quaternion_xyzw is not None
+    for got, gave in zip(message.quaternion_xyzw, quaternion, strict=True):
+        assert math.isclose(got, gave, abs_tol=1e-12)
 
 
 @given(axes=st.lists(unit, min_size=3, max_size=8), stamp=st.none() | st.floats(0, 1e10))

@@ -11,9 +11,11 @@ from rampe_guard.wire import (
     MAX_PAYLOAD_BYTES,
     ActuatorsMessage,
     JoystickMessage,
+    ObjectPose,
     SweepRequest,
     decode_actuators,
     decode_joystick,
+    decode_object_pose,
     decode_sweep_request,
 )
 
@@ -100,6 +102,54 @@ def test_actuators_are_put_in_the_sites_order() -> None:
 def test_actuators_are_refused(payload: bytes, reason: str) -> None:
     with pytest.raises(MessageError) as caught:
         decode_actuators(payload, NAMES)
+    assert caught.value.reason == reason
+
+
+def test_object_pose_is_taken() -> None:
+    payload = b'{"stamp": 12.34, "xyz_m": [1, 2, 3], "rpy_rad": [0, 0, 0.5], "speed": 3}'
+    expected = ObjectPose(xyz_m=(1.0, 2.0, 3.0), rpy_rad=(0.0, 0.0, 0.5), stamp=12.34)
+    assert decode_object_pose(payload) == expected
+    bare = b'{"xyz_m": [1, 2, 3], "quaternion_xyzw": [0, 0, 0, -1], "rpy_rad": null}'
+    assert decode_object_pose(bare) == ObjectPose(
+        xyz_m=(1.0, 2.0, 3.0), quaternion_xyzw=(0.0, 0.0, 0.0, -1.0)
+    )
+
+
+def test_a_rounded_quaternion_gets_the_length_one() -> None:
+    pose = decode_object_pose(b'{"xyz_m": [0, 0, 0], "quaternion_xyzw": [0.5005, 0.5, 0.5, 0.5]}')
+    assert pose.quaternion_xyzw is not None
+    assert sum(value**2 for value in pose.quaternion_xyzw) == pytest.approx(1.0, abs=1e-15)
+
+
+AT = b'{"xyz_m": [0, 0, 0], '
+
+
+@pytest.mark.parametrize(
+    ("payload", "reason"),
+    [
+        (b'{"rpy_rad": [0, 0, 0]}', "bad_json"),
+        (b'{"xyz_m": null, "rpy_rad": [0, 0, 0]}', "bad_json"),
+        (AT + b'"rpy_rad": [0, 0, true]}', "bad_json"),
+        (AT + b'"rpy_rad": [0, 0, 0], "stamp": "now"}', "bad_json"),
+        (b'{"xyz_m": [0, 0], "rpy_rad": [0, 0, 0]}', "wrong_length"),
+        (AT + b'"rpy_rad": [0, 0, 0, 0]}', "wrong_length"),
+        (AT + b'"quaternion_xyzw": [0, 0, 1]}', "wrong_length"),
+        (b'{"xyz_m": [0, 0, 1e7], "rpy_rad": [0, 0, 0]}', "not_finite"),
+        (b'{"xyz_m": [0, 0, NaN], "rpy_rad": [0, 0, 0]}', "not_finite"),
+        (AT + b'"rpy_rad": [0, 0, -1e7]}', "not_finite"),
+        (AT + b'"rpy_rad": [0, 0, 0], "stamp": 1.7e18}', "not_finite"),
+        (b'{"xyz_m": [0, 0, 0]}', "bad_rotation"),
+        (AT + b'"rpy_rad": null}', "bad_rotation"),
+        (AT + b'"rpy_rad": [0, 0, 0], "quaternion_xyzw": [0, 0, 0, 1]}', "bad_rotation"),
+        (AT + b'"quaternion_xyzw": [0, 0, 0, 0]}', "bad_rotation"),
+        (AT + b'"quaternion_xyzw": [0, 0, 0, 1.0011]}', "bad_rotation"),
+        (AT + b'"quaternion_xyzw": [0, 0, 0, 0.9989]}', "bad_rotation"),
+        (AT + b'"rpy_rad": [0, 0, 0]}' + b" " * MAX_PAYLOAD_BYTES, "too_large"),
+    ],
+)
+def test_object_pose_is_refused(payload: bytes, reason: str) -> None:
+    with pytest.raises(MessageError) as caught:
+        decode_object_pose(payload)
     assert caught.value.reason == reason
 
 
