@@ -1,85 +1,106 @@
-"""Triangle meshes: read, checked before FCL may see them, and asked what lies inside."""
+"""Triangle meshes: read, mended and checked before FCL may see them; what lies inside."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 import trimesh
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
+from rampe_guard.collision.mesh_read import MAX_TRIANGLES, read_mesh, refuse_too_many
+from rampe_guard.collision.mesh_repair import (
+    first_of_equal,
+    oriented,
+    without_collapsed,
+    without_duplicates,
+    without_needles,
+)
+from rampe_guard.collision.mesh_topology import IntArray, Parts, edges, part_labels, parts_of
 from rampe_guard.errors import GeometryError
 
 if TYPE_CHECKING:
     from rampe_guard.core.types import FloatArray
 
-IntArray: TypeAlias = npt.NDArray[np.int64]
-MAX_TRIANGLES = 2_000_000
+__all__ = [
+    "MAX_COORDINATE_M",
+    "MAX_TRIANGLES",
+    "IntArray",
+    "TriangleMesh",
+    "ball_mesh",
+    "box_mesh",
+    "check_extent",
+    "checked_mesh",
+    "load_mesh",
+    "open_words",
+    "prism_mesh",
+]
+
 MAX_COORDINATE_M = 1e5
+"""Beyond, rounding would be felt in a tenth of a millimetre of a chain of sums [m]."""
+MAX_RAW_COORDINATE = 1e9
+"""In a file, whose unit may be a micrometre."""
+LINK_MOST_M = 200.0
+"""No link is larger; what is, is in millimetres [m]."""
+ZONE_MOST_M = 20_000.0
+"""No terrain is larger [m]."""
+LEAST_M = 1e-3
+"""No link or obstacle is smaller; what is, was scaled twice [m]."""
 ROUND_SIDES = 48
 """Sides of the prism that stands for a round link primitive."""
 
 
-_LEAST_FILL = 1e-6
-"""Share of its box that a closed mesh must fill to count as a solid."""
-
-
 @dataclass(frozen=True, slots=True)
 class TriangleMesh:
-    """A checked mesh: finite vertices (v, 3) [m], faces (f, 3) with distinct corners, f >= 1."""
+    """A checked mesh: finite vertices (v, 3) [m], faces (f, 3) with distinct corners, f >= 1.
+
+    ``notes`` are sentences: what was mended in it.
+    """
 
     vertices: FloatArray
     faces: IntArray
+    notes: tuple[str, ...] = ()
 
     def moved(self, pose: FloatArray, scale: FloatArray | float = 1.0) -> TriangleMesh:
-        """The mesh scaled, then posed."""
+        """The mesh scaled, then posed; a mirroring scale keeps its outside outside."""
         vertices = (self.vertices * scale) @ pose[:3, :3].T + pose[:3, 3]
-        return TriangleMesh(vertices, self.faces)
+        mirrored = np.prod(np.broadcast_to(scale, 3)) < 0.0
+        return TriangleMesh(vertices, self.faces[:, ::-1] if mirrored else self.faces, self.notes)
+
+    def parts(self) -> Parts:
+        """Parts that share no vertex, and which of them have an inside."""
+        return parts_of(self.vertices, self.faces)
 
     def components(self) -> list[TriangleMesh]:
         """Parts that share no vertex."""
-        count = len(self.vertices)
-        a, b = self.faces[:, [0, 1]].ravel(), self.faces[:, [1, 2]].ravel()
-        graph = coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(count, count))
-        _, label = connected_components(graph, directed=False)
-        of_face = label[self.faces[:, 0]]
+        label = part_labels(self.faces, len(self.vertices))
         return [
-            TriangleMesh(self.vertices, self.faces[of_face == part]).compact()
-            for part in np.unique(of_face)
+            TriangleMesh(self.vertices, self.faces[label == part]).compact()
+            for part in range(int(label.max()) + 1)
         ]
 
     def compact(self) -> TriangleMesh:
         """The mesh without vertices that no face uses."""
         used, faces = np.unique(self.faces, return_inverse=True)
-        return TriangleMesh(self.vertices[used], faces.reshape(self.faces.shape).astype(np.int64))
+        faces = faces.reshape(self.faces.shape).astype(np.int64)
+        return TriangleMesh(self.vertices[used], faces, self.notes)
 
     def is_watertight(self) -> bool:
         """Whether every edge is walked once each way, so that inside and outside are told apart."""
-        forth, back = self._walks()
-        return bool((forth == back).all() and (np.diff(forth) > 0).all())
+        key, forth = edges(self.faces, len(self.vertices))
+        up, down = np.sort(key[forth]), np.sort(key[~forth])
+        return bool(np.array_equal(up, down) and (np.diff(up) > 0).all())
 
     def is_closed(self) -> bool:
         """Whether inside and outside can be told apart, touching edges allowed.
 
-        Every edge is walked as often one way as the other, and there is a volume: a skin and
-        its mirror image cancel and enclose nothing.
+        In every part each edge is walked as often one way as the other, and there is a volume: a
+        skin and its mirror image cancel and enclose nothing.
         """
-        forth, back = self._walks()
-        a, b, c = (self.vertices[self.faces] - self.vertices.mean(axis=0)).transpose(1, 0, 2)
-        volume = abs(float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum())) / 6.0
-        box = float(np.prod(np.ptp(self.vertices, axis=0)))
-        return bool((forth == back).all()) and volume > _LEAST_FILL * box
-
-    def _walks(self) -> tuple[IntArray, IntArray]:
-        """All directed edges as numbers, and the same edges walked backwards, both sorted."""
-        edges = self.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-        count = len(self.vertices)
-        forth = np.sort(edges[:, 0] * count + edges[:, 1])
-        return forth, np.sort(edges[:, 1] * count + edges[:, 0])
+        return bool(self.parts().closed.all())
 
     def winding(self, points: FloatArray) -> FloatArray:
         """Winding number of points (n, 3): ±1 inside a watertight mesh, 0 outside."""
@@ -95,8 +116,22 @@ class TriangleMesh:
         return result
 
 
-def checked_mesh(vertices: FloatArray, faces: IntArray, name: str) -> TriangleMesh:
-    """A mesh fit for use, its equal vertices merged and collapsed triangles dropped.
+def checked_mesh(
+    vertices: FloatArray,
+    faces: IntArray,
+    name: str,
+    *,
+    notes: Sequence[str] = (),
+    most: float = MAX_COORDINATE_M,
+) -> TriangleMesh:
+    """A mesh fit for use: equal vertices merged, triangles mended, each repair with a word.
+
+    Args:
+        vertices: (v, 3) [m].
+        faces: (f, 3).
+        name: what errors and notes call it.
+        notes: on repairs already made.
+        most: largest coordinate allowed [m].
 
     Raises:
         GeometryError: naming ``name`` and what is wrong.
@@ -105,43 +140,110 @@ def checked_mesh(vertices: FloatArray, faces: IntArray, name: str) -> TriangleMe
     faces = np.asarray(faces, dtype=np.int64).reshape(-1, 3)
     if not len(faces):
         raise GeometryError(f"{name}: no triangles; give a mesh with a surface")
-    if len(faces) > MAX_TRIANGLES:
-        raise GeometryError(
-            f"{name}: {len(faces)} triangles; more than {MAX_TRIANGLES} are refused, simplify it"
-        )
+    refuse_too_many(len(faces), name)
     if faces.min() < 0 or faces.max() >= len(vertices):
-        raise GeometryError(f"{name}: a triangle names vertex {faces.max()} of {len(vertices)}")
-    bad = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+        wrong = faces.min() if faces.min() < 0 else faces.max()
+        raise GeometryError(f"{name}: a triangle names vertex {wrong} of {len(vertices)}")
+    words: list[str] = []
+    used = np.zeros(len(vertices), dtype=bool)
+    used[faces] = True
+    if not used.all():
+        words.append(f"{int((~used).sum())} vertices of no triangle left out")
+    bad = np.flatnonzero(used & ~np.isfinite(vertices).all(axis=1))
     if bad.size:
         raise GeometryError(f"{name}: vertex {bad[0]} is {vertices[bad[0]]}, not finite")
-    if np.abs(vertices).max() > MAX_COORDINATE_M:
-        raise GeometryError(
-            f"{name}: a coordinate of {np.abs(vertices).max():.3g} m; wrong unit or scale?"
-        )
-    vertices, merged = np.unique(vertices, axis=0, return_inverse=True)
-    faces = merged.reshape(-1)[faces]
-    a, b, c = faces.T
-    faces = faces[(a != b) & (b != c) & (c != a)]
+    largest = float(np.abs(vertices[used]).max())
+    if largest > most:
+        raise GeometryError(f"{name}: a coordinate of {largest:.3g} m; wrong unit or scale?")
+    vertices, faces = _merged(vertices, faces, used)
+    faces, said = without_collapsed(faces)
+    words += said
     if not len(faces):
         raise GeometryError(f"{name}: all triangles are collapsed; wrong scale?")
-    return TriangleMesh(vertices, faces).compact()
+    faces, said = without_duplicates(faces, len(vertices))
+    words += said
+    faces, said = without_needles(vertices, faces)
+    words += said
+    if not len(faces):
+        raise GeometryError(f"{name}: no triangle has an area; give a mesh with a surface")
+    faces, said, _ = oriented(vertices, faces)
+    words += said
+    told = (*notes, *(f"{name}: {sentence}" for sentence in words))
+    mesh = TriangleMesh(vertices, faces, tuple(dict.fromkeys(told)))
+    return mesh.compact() if words else mesh
+
+
+def _merged(
+    vertices: FloatArray, faces: IntArray, used: npt.NDArray[np.bool_]
+) -> tuple[FloatArray, IntArray]:
+    """Equal vertices as one; those of no triangle gone."""
+    if not used.all():
+        faces = (np.cumsum(used) - 1)[faces]
+        vertices = vertices[used]
+    # 0.0 added: -0.0 and 0.0 are the same place
+    first, kind = first_of_equal(vertices + 0.0)
+    if len(first) == len(vertices):
+        return vertices, faces
+    return vertices[first], kind[faces]
 
 
 def load_mesh(file: str | Path) -> TriangleMesh:
     """Read an STL, OBJ, DAE or other mesh file that trimesh knows.
 
+    Coordinates are those of the file, times its unit where it names one [m].
+
     Raises:
         GeometryError: naming the file and what is wrong with it.
     """
     path = Path(file)
-    if not path.is_file():
-        raise GeometryError(f"{path}: no such mesh file")
-    try:
-        loaded = trimesh.load_scene(str(path), process=False).to_mesh()
-        vertices, faces = np.asarray(loaded.vertices), np.asarray(loaded.faces)
-    except Exception as error:  # readers of foreign formats raise whatever they like
-        raise GeometryError(f"{path}: cannot be read as a mesh: {error}") from error
-    return checked_mesh(vertices, faces, str(path))
+    raw = read_mesh(path)
+    vertices, notes = raw.vertices, []
+    if raw.unit_m is not None and raw.unit_m != 1.0:
+        vertices = vertices * raw.unit_m
+        notes.append(f"{path}: the file's unit is {raw.unit_m:g} m: taken to metres")
+    return checked_mesh(vertices, raw.faces, str(path), notes=notes, most=MAX_RAW_COORDINATE)
+
+
+def check_extent(mesh: TriangleMesh, name: str, most_m: float = LINK_MOST_M) -> tuple[str, ...]:
+    """See that a mesh in metres has a size that a link or an obstacle can have.
+
+    Args:
+        mesh: scaled.
+        name: what errors and notes call it.
+        most_m: largest extent that can be (LINK_MOST_M, ZONE_MOST_M); from a tenth of it on there
+            is a word [m].
+
+    Returns:
+        Sentences, none if nothing is remarkable.
+
+    Raises:
+        GeometryError: naming ``name``, the extent, and the scale that is likely right.
+    """
+    extent = float(np.ptp(mesh.vertices, axis=0).max())
+    if extent < LEAST_M:
+        raise GeometryError(
+            f"{name}: is {extent * 1e3:.3g} mm in all; likely it was scaled twice: leave out its"
+            " scale of 0.001, or give the scale that makes it metres"
+        )
+    if extent > most_m:
+        raise GeometryError(
+            f"{name}: is {extent:.4g} m long, more than {most_m:g} m; likely its unit is the"
+            " millimetre: give it a scale of 0.001"
+        )
+    if extent > 0.1 * most_m:
+        return (f"{name}: is {extent:.4g} m long; if that is in millimetres, scale it by 0.001",)
+    return ()
+
+
+def open_words(mesh: TriangleMesh, name: str) -> tuple[str, ...]:
+    """A sentence on parts that are not closed, none if all are."""
+    parts = mesh.parts()
+    missing = len(parts) - int(parts.closed.sum())
+    if not missing:
+        return ()
+    which = "it" if len(parts) == 1 else f"{missing} of {len(parts)} parts"
+    verb = "is" if missing == 1 else "are"
+    return (f"{name}: {which} {verb} not closed: a surface without an inside",)
 
 
 def box_mesh(size: FloatArray) -> TriangleMesh:
