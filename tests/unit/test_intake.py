@@ -1,0 +1,132 @@
+"""Zenoh messages to core inputs, on a bus that is made up."""
+
+from __future__ import annotations
+
+import json
+from collections import defaultdict
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from rampe_guard.core.types import Inputs
+from rampe_guard.runtime.intake import Intake
+from rampe_guard.runtime.say import Sayer
+from rampe_guard.runtime.worker import arrived
+from rampe_guard.runtime.zenoh_io import Bus, Message
+from rampe_guard.settings import load_site
+
+SITE = """\
+site: quarry
+machine: e7
+keys: {joystick: r/joystick, actuators: r/actuators, base: r/guard}
+arm:
+  urdf: arm.urdf
+  actuators:
+    - {name: swing, joint: swing_joint, max_velocity: 0.6}
+scene: scene.yaml
+"""
+SCENE = """\
+objects:
+  - {name: wall, type: sphere, radius_m: 1, center: [9, 0, 0]}
+  - {name: truck, type: sphere, radius_m: 1, center: [0, 0, 0], key: r/truck, max_speed: 2}
+  - {name: van, type: box, size: [1, 1, 1], key: r/van, max_speed: 2}
+"""
+
+
+class Ring:
+    """Messages that wait on one key."""
+
+    def __init__(self) -> None:
+        self.waiting: list[Message] = []
+        self.overruns = 0
+
+    def drain(self) -> list[Message]:
+        taken, self.waiting = self.waiting, []
+        return taken
+
+
+class Post:
+    """Stands in for the bus: one ring for each key that was subscribed to."""
+
+    def __init__(self) -> None:
+        self.rings: defaultdict[str, Ring] = defaultdict(Ring)
+
+    def inbox(self, key: str) -> Ring:
+        return self.rings[key]
+
+    def put(self, key: str, body: Any, on: str | None = None) -> None:
+        payload = body if isinstance(body, bytes) else json.dumps(body).encode()
+        self.rings[key].waiting.append(Message(on or key, payload))
+
+
+@pytest.fixture
+def post() -> Post:
+    return Post()
+
+
+@pytest.fixture
+def intake(post: Post, tmp_path: Path) -> Intake:
+    (tmp_path / "arm.urdf").write_text("<robot name='arm'/>", encoding="utf-8")
+    (tmp_path / "scene.yaml").write_text(SCENE, encoding="utf-8")
+    (tmp_path / "site.yaml").write_text(SITE, encoding="utf-8")
+    return Intake(cast("Bus", post), load_site(tmp_path / "site.yaml"), Sayer("test"))
+
+
+def test_only_objects_with_a_key_are_subscribed_to(post: Post, intake: Intake) -> None:
+    assert set(post.rings) == {"r/joystick", "r/actuators", "r/truck", "r/van"}
+    assert not arrived(intake.collect(1.0))
+
+
+def test_poses_become_samples_in_order(post: Post, intake: Intake) -> None:
+    turn = [0.0, 0.0, np.sin(0.25), np.cos(0.25)]
+    post.put("r/truck", {"stamp": 7.0, "xyz_m": [1, 2, 3], "rpy_rad": [0, 0, 0.5]})
+    post.put("r/truck", {"xyz_m": [4, 5, 6], "quaternion_xyzw": turn})
+    inputs = intake.collect(12.0)
+    assert arrived(inputs)
+    first, second = inputs.objects
+    assert (first.name, first.stamp_s, first.arrival_s, first.stamped) == ("truck", 7.0, 12.0, True)
+    assert (second.stamp_s, second.stamped) == (12.0, False)
+    assert first.pose[:3, 3].tolist() == [1, 2, 3]
+    assert second.pose[:3, 3].tolist() == [4, 5, 6]
+    assert first.pose[3].tolist() == [0, 0, 0, 1]
+    c, s = np.cos(0.5), np.sin(0.5)
+    assert first.pose[:3, :3] == pytest.approx(np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]))
+    assert second.pose == pytest.approx(
+        np.vstack([np.column_stack([first.pose[:3, :3], [4, 5, 6]]), [0, 0, 0, 1]])
+    )
+
+
+def test_roll_pitch_and_yaw_turn_about_fixed_axes(post: Post, intake: Intake) -> None:
+    post.put("r/van", {"xyz_m": [0, 0, 0], "rpy_rad": [0.3, -0.4, 0.5]})
+    (sample,) = intake.collect(1.0).objects
+    (cr, cp, cy), (sr, sp, sy) = np.cos([0.3, -0.4, 0.5]), np.sin([0.3, -0.4, 0.5])
+    roll = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
+    pitch = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
+    yaw = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
+    assert sample.pose[:3, :3] == pytest.approx(yaw @ pitch @ roll)
+
+
+def test_what_is_no_pose_is_refused_by_name(post: Post, intake: Intake) -> None:
+    good = {"xyz_m": [0, 0, 0], "rpy_rad": [0, 0, 0]}
+    post.put("r/truck", b"{")
+    post.put("r/van", {"xyz_m": [0, 0, 0]})
+    post.put("r/van", good, on="r/*")
+    post.put("r/van", good)
+    inputs = intake.collect(1.0)
+    refused = (("truck", "bad_json"), ("van", "bad_rotation"), ("van", "wildcard_key"))
+    assert inputs.objects_rejected == refused
+    assert [sample.name for sample in inputs.objects] == ["van"]
+    assert inputs.rejected == ()
+
+
+def test_refusals_alone_wake_the_guard() -> None:
+    assert arrived(Inputs(objects_rejected=(("truck", "bad_json"),)))
+    assert not arrived(Inputs())
+
+
+def test_lost_poses_are_counted(post: Post, intake: Intake) -> None:
+    post.rings["r/van"].overruns = 2
+    post.rings["r/joystick"].overruns = 1
+    assert intake.overruns == 3
