@@ -55,6 +55,8 @@ def _keys(site: Site) -> Table:
     table = _table("keys and files", "what", "where")
     table.add_row("joystick", site.keys.joystick)
     table.add_row("actuators", site.keys.actuators)
+    for item in site.scene.moving:
+        table.add_row(f"poses of {item.name}", item.key)
     table.add_row("published under", site.keys.base)
     table.add_row("zenoh", site.zenoh.config or f"{site.zenoh.mode} {' '.join(site.zenoh.connect)}")
     table.add_row("learned models", str(model_path(site)) if site.memory.enabled else "not kept")
@@ -98,6 +100,8 @@ def _zones(machine: Machine, pose: FloatArray) -> Table:
         where = "unknown" if near is None else f"{near:.2f} {_unit(machine, zone)} clear"
         if found.inside:
             where = f"the arm is inside ({found.link or 'actuator'})"
+        if not isinstance(zone, ActuatorLimit) and zone.key is not None:
+            where = f"moves: unknown without a pose newer than {zone.timeout_s:g} s"
         margin = "" if isinstance(zone, ActuatorLimit) else f"{zone.margin_m:g} m"
         table.add_row(zone.name, type(zone).__name__, margin, where)
     return table

@@ -38,6 +38,12 @@ def replay_offline(
     site = load_site(site_path)
     machine = load_machine(site)
     log = _read(read_csv_log(site, log_path, machine.arm.limits))
+    for item in site.scene.moving:
+        print(  # noqa: T201
+            f"warning: the log has no poses of {item.name} ({item.key}): it is unknown"
+            " throughout, and taken as contact",
+            file=sys.stderr,
+        )
     guard = machine.guard(float(log.time_s[0]), BOOT_ID)
     scribe = Scribe(site, BOOT_ID, lambda now_s: now_s)
     tally = Tally(machine.sweeper, machine.sweeper.zones)
