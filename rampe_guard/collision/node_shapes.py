@@ -26,7 +26,9 @@ KEPT = 64
 """Directions in which a thinned hull keeps its outermost vertex."""
 _ADDED = (16, 16)
 """Vertices that are added to a thinned hull in one go after the other, where it misses most."""
-_FACETS = 6
+_EXACT_REACH = 250
+"""So many points are measured while vertices are being chosen; more only at the end."""
+_FACETS = 4
 """Facets that are looked at for the nearest one."""
 ROUNDING = 1e-13
 """Share of the largest coordinate that the arithmetic here may err by."""
@@ -48,7 +50,7 @@ def hull_points(points: FloatArray) -> tuple[IntArray, float]:
     for block in np.array_split(np.arange(len(found.equations)), 1 + len(rest) // 500):
         plane = found.equations[block]
         outside |= (points[rest] @ plane[:, :3].T + plane[:, 3] > 0.0).any(axis=1)
-    reach, _ = _reaches(points[rest[outside]], points[found.simplices], found.equations)
+    reach = _reaches(points[rest[outside]], points[found.simplices], found.equations)
     return kept.astype(np.int64), float(reach.max(initial=0.0)) + ROUNDING * float(
         np.abs(points).max()
     )
@@ -67,16 +69,22 @@ def thinned(points: FloatArray) -> tuple[IntArray, float]:
             found = ConvexHull(points[kept])
         except QhullError:
             return np.arange(len(points)), 0.0
-        reach, nearest = _reaches(points[rest], points[kept[found.simplices]], found.equations)
         if more:
-            kept = np.union1d(kept, rest[_farthest(reach, nearest, more)])
+            facets = points[kept[found.simplices]]
+            kept = np.union1d(kept, rest[_farthest(points[rest], facets, found.equations, more)])
+    reach = _reaches(points[rest], points[kept[found.simplices]], found.equations)
     return kept, float(reach.max(initial=0.0)) + ROUNDING * float(np.abs(points).max())
 
 
-def _farthest(reach: FloatArray, nearest: IntArray, most: int) -> IntArray:
-    """The farthest point of each facet, and of those the ``most`` farthest."""
+def _farthest(points: FloatArray, triangles: FloatArray, planes: FloatArray, most: int) -> IntArray:
+    """Of the points (k, 3) the farthest beyond each facet, and of those the ``most`` farthest."""
+    beyond = points @ planes[:, :3].T + planes[:, 3]
+    facet = np.argmax(beyond, axis=1)
+    # beyond a sharp edge the planes say too little; of many points some will do
+    near = len(points) <= _EXACT_REACH
+    reach = _reaches(points, triangles, planes) if near else beyond.max(axis=1)
     order = np.argsort(-reach, kind="stable")
-    _, first = np.unique(nearest[order], return_index=True)
+    _, first = np.unique(facet[order], return_index=True)
     return np.asarray(order[np.sort(first)[:most]])
 
 
@@ -140,10 +148,8 @@ def _reach(points: FloatArray, triangles: FloatArray) -> float:
     return float(_to_facets(points, triangles, facets).min(axis=1, initial=np.inf).max(initial=0.0))
 
 
-def _reaches(
-    points: FloatArray, triangles: FloatArray, planes: FloatArray
-) -> tuple[FloatArray, IntArray]:
-    """At most how far each point (k, 3) is from a hull [m] (k,), and a facet near it (k,).
+def _reaches(points: FloatArray, triangles: FloatArray, planes: FloatArray) -> FloatArray:
+    """At most how far each point (k, 3) is from a hull (k,) [m].
 
     Only the facets are looked at whose planes (t, 4) the point is farthest beyond: another one
     may be nearer, so the answer may be too large, never too small.
@@ -151,10 +157,7 @@ def _reaches(
     beyond = points @ planes[:, :3].T + planes[:, 3]
     count = min(_FACETS, len(triangles))
     facets = np.argpartition(-beyond, count - 1, axis=1)[:, :count]
-    distance = _to_facets(points, triangles, facets)
-    best = np.argmin(distance, axis=1)[:, None]
-    nearest = np.take_along_axis(facets, best, axis=1)[:, 0]
-    return np.take_along_axis(distance, best, axis=1)[:, 0], nearest
+    return np.asarray(_to_facets(points, triangles, facets).min(axis=1))
 
 
 def _to_facets(points: FloatArray, triangles: FloatArray, facets: IntArray) -> FloatArray:
