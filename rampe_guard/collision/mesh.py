@@ -187,30 +187,38 @@ def _merged(
     return vertices[first], kind[faces]
 
 
-def load_mesh(file: str | Path) -> TriangleMesh:
+def load_mesh(file: str | Path, scale: FloatArray | None = None) -> TriangleMesh:
     """Read an STL, OBJ, DAE or other mesh file that trimesh knows.
 
-    Coordinates are those of the file, times its unit where it names one [m].
+    Args:
+        file: its coordinates count in the unit that it names, or as metres.
+        scale: three factors on top of that; None if the caller will scale, so that even
+            micrometres are let through.
 
     Raises:
         GeometryError: naming the file and what is wrong with it.
     """
     path = Path(file)
     raw = read_mesh(path)
-    vertices, notes = raw.vertices, []
+    vertices, faces, notes = raw.vertices, raw.faces, []
     if raw.unit_m is not None and raw.unit_m != 1.0:
         vertices = vertices * raw.unit_m
         notes.append(f"{path}: the file's unit is {raw.unit_m:g} m: taken to metres")
-    return checked_mesh(vertices, raw.faces, str(path), notes=notes, most=MAX_RAW_COORDINATE)
+    most = MAX_RAW_COORDINATE
+    if scale is not None:
+        vertices, most = vertices * scale, MAX_COORDINATE_M
+        if np.prod(np.sign(scale)) < 0.0:
+            faces = faces[:, ::-1]
+    return checked_mesh(vertices, faces, str(path), notes=notes, most=most)
 
 
-def check_extent(mesh: TriangleMesh, name: str, most_m: float = LINK_MOST_M) -> tuple[str, ...]:
-    """See that a mesh in metres has a size that a link or an obstacle can have.
+def check_extent(extent: float, name: str, most_m: float = LINK_MOST_M) -> tuple[str, ...]:
+    """See that something in metres has a size that a link or an obstacle can have.
 
     Args:
-        mesh: scaled.
+        extent: its longest side [m].
         name: what errors and notes call it.
-        most_m: largest extent that can be (LINK_MOST_M, ZONE_MOST_M); from a tenth of it on there
+        most_m: longest side that can be (LINK_MOST_M, ZONE_MOST_M); from a tenth of it on there
             is a word [m].
 
     Returns:
@@ -219,7 +227,6 @@ def check_extent(mesh: TriangleMesh, name: str, most_m: float = LINK_MOST_M) -> 
     Raises:
         GeometryError: naming ``name``, the extent, and the scale that is likely right.
     """
-    extent = float(np.ptp(mesh.vertices, axis=0).max())
     if extent < LEAST_M:
         raise GeometryError(
             f"{name}: is {extent * 1e3:.3g} mm in all; likely it was scaled twice: leave out its"

@@ -26,7 +26,7 @@ KEPT = 64
 """Directions in which a thinned hull keeps its outermost vertex."""
 _ADDED = (16, 16)
 """Vertices that are added to a thinned hull in one go after the other, where it misses most."""
-_EXACT_REACH = 250
+_EXACT_REACH = 500
 """So many points are measured while vertices are being chosen; more only at the end."""
 _FACETS = 4
 """Facets that are looked at for the nearest one."""
