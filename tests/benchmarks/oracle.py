@@ -1,6 +1,23 @@
-"""Random motions of two arms in random scenes: the sweep against dense sampling.
+"""The sweep against an oracle of its own, on motions constructed to be hard.
 
-Run it as ``python tests/benchmarks/oracle.py --motions 300`` from the project's root.
+Run it from the project's root, all of it (hours on one core) or one case again::
+
+    python tests/benchmarks/oracle.py --motions 5000 --jobs 2
+    python tests/benchmarks/oracle.py --arms zx200 --seed 0 --case 1234
+
+A motion is swept forwards, backwards and without sharp clearances, and each answer is held, zone
+by zone, against distances of the exact meshes (tests/support/search.py). Exit code 1 if any
+promise is broken:
+
+    missed     said free, touches
+    false      said contact, never comes within twice the tolerance
+    late       touches before the fraction called
+    early      called by more than the tolerance of motion before it touches
+    clearance  said more than is there           loose  said less by more than its tolerance
+    now        said more than is there at the start
+    place      the link named is not near where it is said to touch
+    unknown    the budget did not suffice
+    any_path   "free" refuted by a way, or "possible" by its own witness
 """
 
 from __future__ import annotations
@@ -8,68 +25,130 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections import Counter
+import time
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
-from rampe_guard.collision import FclSweeper, load_arm  # noqa: E402
-from rampe_guard.core.arm import ArmDescription  # noqa: E402
-from rampe_guard.core.scene import Scene  # noqa: E402
-from rampe_guard.settings import load_site  # noqa: E402
-from tests.support.arms import six_axis  # noqa: E402
-from tests.support.compare import compare  # noqa: E402
-from tests.support.dense import DenseArm  # noqa: E402
-from tests.support.scenes import random_motion, random_scene  # noqa: E402
+from tests.support.hard_cases import KINDS, PER_BATCH, Machine  # noqa: E402
+from tests.support.machines import NAMES, AbsentError, machine  # noqa: E402
+from tests.support.oracle_run import Tally, batches, kind_of, run_batch  # noqa: E402
 
-PER_SCENE = 5
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from rampe_guard.collision.urdf import Arm
+
+FAULTS = ("missed", "false", "late", "early", "clearance", "loose", "now", "place", "unknown")
+HEAD = (
+    f"{'arm':10} {'kind':8} {'motions':>7} {'verdicts':>8} {'touching':>8} "
+    + " ".join(f"{fault:>{max(len(fault), 5)}}" for fault in (*FAULTS, "any_path"))
+    + f" {'early mm':>9} {'over mm':>9} {'under mm':>9} {'witness mm':>10} {'median ms':>9}"
+)
+TOLD = 5
+"""Stories of each kind of fault that are printed."""
+
+_machines: dict[str, tuple[Machine, Arm]] = {}
 
 
-def run(description: ArmDescription, reach: float, motions: int, seed: int, folder: Path) -> int:
-    """Print figures for one arm; the number of wrong verdicts."""
-    rng = np.random.default_rng(seed)
-    arm, dense = load_arm(description), DenseArm(description)
-    lower = np.where(np.isfinite(arm.limits[:, 0]), arm.limits[:, 0], -3.0)
-    upper = np.where(np.isfinite(arm.limits[:, 1]), arm.limits[:, 1], 3.0)
-    kinds: Counter[str] = Counter()
-    early: list[float] = []
-    times: list[float] = []
-    bad = 0
-    for _ in range(-(-motions // PER_SCENE)):
-        items = random_scene(rng, folder, reach)
-        sweeper = FclSweeper(arm, Scene(tuple(items)))
-        for _ in range(PER_SCENE):
-            start, displacement = random_motion(rng, lower, upper, 0.25)
-            times.append(sweeper.sweep(start, displacement).elapsed_ms or 0.0)
-            for verdict in compare(sweeper, dense, items, start, displacement):
-                kinds[verdict.certificate.value] += 1
-                early += [] if verdict.early_m is None else [verdict.early_m]
-                if verdict.wrong:
-                    bad += 1
-                    print("WRONG", verdict.zone, verdict.wrong, start.tolist(), displacement)
-    print(f"{arm.name}: {len(times)} motions, zones {dict(kinds)}, wrong {bad}")
-    if early:
-        later = 1e3 * np.percentile(early, [50, 99, 100])
-        print(f"  called before the dense contact by [mm] median/p99/max {later.round(2)}")
-    print(f"  sweep [ms] median/p99/max {np.percentile(times, [50, 99, 100]).round(2)}")
-    return bad
+def work(name: str, seed: int, batch: int, only: int | None, folder: str) -> Tally:
+    """One batch; an arm is loaded once by each process."""
+    if name not in _machines:
+        _machines[name] = machine(name, Path(folder))
+    with tempfile.TemporaryDirectory(dir=folder) as own:
+        return run_batch(*_machines[name], seed, batch, Path(own), only=only)
+
+
+def row(name: str, kind: str, tally: Tally) -> str:
+    """One line of the table."""
+    counts = " ".join(
+        f"{tally.faults.get(fault, 0):>{max(len(fault), 5)}}" for fault in (*FAULTS, "any_path")
+    )
+    lengths = (tally.early, tally.over, tally.under)
+    figures = " ".join(f"{1e3 * length:9.4f}" for length in lengths)
+    median = float(np.median(tally.times)) if tally.times else 0.0
+    return (
+        f"{name:10} {kind:8} {tally.motions:7} {tally.verdicts:8} {tally.touching:8} {counts} "
+        f"{figures} {1e3 * tally.witness:10.4f} {median:9.2f}"
+    )
+
+
+def done_tasks(
+    tasks: Sequence[tuple[str, int]], options: argparse.Namespace, folder: str
+) -> Iterator[tuple[str, int, Tally]]:
+    """Batches as they get done, in this process or in several."""
+    if options.jobs == 1:
+        for name, batch in tasks:
+            yield name, batch, work(name, options.seed, batch, options.case, folder)
+        return
+    with ProcessPoolExecutor(options.jobs, mp_context=get_context("spawn")) as pool:
+        running = {
+            pool.submit(work, name, options.seed, batch, options.case, folder): (name, batch)
+            for name, batch in tasks
+        }
+        for future in as_completed(running):
+            yield *running[future], future.result()
+
+
+def present(names: Sequence[str], folder: Path) -> list[str]:
+    """The arms that can be loaded; the others are named and skipped."""
+    found = []
+    for name in names:
+        try:
+            _machines[name] = machine(name, folder)
+        except AbsentError as why:
+            print(f"{name}: skipped, {why}")
+        else:
+            found.append(name)
+    return found
 
 
 def main() -> int:
-    """Both arms."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--motions", type=int, default=300, help="in all, half for each arm")
+    """Print the table; 1 if a promise was broken or nothing could be tried."""
+    parser = argparse.ArgumentParser(description=str(__doc__).split("\n", maxsplit=1)[0])
+    parser.add_argument("--motions", type=int, default=120, help="in all, shared by the arms")
+    parser.add_argument("--arms", nargs="+", default=["ur5", "excavator", "zx200"], choices=NAMES)
+    parser.add_argument("--kinds", nargs="+", default=list(KINDS), choices=KINDS)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--case", type=int, help="only this motion, of each arm given")
+    parser.add_argument("--jobs", type=int, default=1, help="processes")
     options = parser.parse_args()
-    half = options.motions // 2
-    site = load_site(ROOT / "config" / "sites" / "demo.yaml")
+    tallies: dict[tuple[str, str], Tally] = {}
+    begin = time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
-        bad = run(six_axis(Path(folder)), 1.0, half, options.seed, Path(folder))
-        bad += run(site.arm, 8.0, half, options.seed, Path(folder))
-    return 1 if bad else 0
+        arms = present(options.arms, Path(folder))
+        share = -(-options.motions // max(len(arms), 1))
+        numbers = batches(share) if options.case is None else [options.case // PER_BATCH]
+        wanted = [n for n in numbers if options.case is not None or kind_of(n) in options.kinds]
+        tasks = [(name, batch) for batch in wanted for name in arms]
+        for i, (name, batch, tally) in enumerate(done_tasks(tasks, options, folder), 1):
+            tallies.setdefault((name, kind_of(batch)), Tally()).add(tally)
+            faults = f", {sum(tally.faults.values())} faults" if tally.faults else ""
+            spent = time.monotonic() - begin
+            print(f"[{spent:6.0f} s] {i}/{len(tasks)} {name} batch {batch}{faults}", flush=True)
+    return report(tallies, options.seed)
+
+
+def report(tallies: dict[tuple[str, str], Tally], seed: int) -> int:
+    """Faults first, a few of each kind, then the table."""
+    total = Tally()
+    for tally in tallies.values():
+        total.add(tally)
+    for fault in (*FAULTS, "any_path"):
+        for story in [s for s in total.stories if s.startswith(f"{fault}:")][:TOLD]:
+            print(f"{story}   [--seed {seed}]")
+    print(HEAD)
+    for (name, kind), tally in sorted(tallies.items()):
+        print(row(name, kind, tally))
+    print(row("all", "", total))
+    print(f"any_path answers: {total.answers}")
+    return 1 if total.faults or not total.motions else 0
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
-"""The other way to find contacts: dense samples of the motion, FCL `collide` on exact shapes.
+"""The other way to see a motion: an arm read, posed and placed by code of its own.
 
-It shares no code with the sweep: the URDF is read with ElementTree, kinematics is written with
-scipy rotations, shapes are FCL's own primitives, and nothing but `collide` is asked.
+It shares nothing with the sweep but the description of the site: the URDF is read with
+ElementTree, drives are those of `tests.support.linkages`, poses are products of matrices.
+`first_contacts` is the plainest oracle there is: `collide` at every sample, nothing skipped.
 """
 
 from __future__ import annotations
@@ -9,21 +10,151 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import fcl
 import numpy as np
-import trimesh
 from scipy.spatial.transform import Rotation
 
-from rampe_guard.core.drive import joint_value
-from rampe_guard.core.scene import Box, Capsule, Cylinder, Mesh, SolidObject, Sphere
+from tests.support.bodies import (
+    LinkBody,
+    Surface,
+    box_surface,
+    cylinder_surface,
+    link_body,
+    read_surface,
+    segment,
+)
+from tests.support.linkages import joint_from_actuator
+from tests.support.obstacles import Obstacle
 
 if TYPE_CHECKING:
     from rampe_guard.core.arm import ArmDescription
+    from rampe_guard.core.scene import SolidObject
     from rampe_guard.core.types import FloatArray
 
-STEP_M = 0.002
+STEP_M = 0.001
+"""Longest way of any point between two samples [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """One joint on the way to a link: fixed ``origin``, then the joint's own motion."""
+
+    origin: FloatArray
+    joint: str
+    axis: FloatArray
+    slides: bool
+
+
+class DenseArm:
+    """An arm as the URDF and the site describe it.
+
+    Attributes:
+        names: of all links.
+        bodies: geometry per link; None where it has none.
+    """
+
+    def __init__(self, description: ArmDescription) -> None:
+        path = Path(description.urdf)
+        root = ET.parse(path).getroot()  # noqa: S314  # our own files
+        self._base = np.asarray(description.base_pose, dtype=float)
+        self._drives = {joint.joint: joint for joint in description.joints}
+        self._above: dict[str, ET.Element] = {}
+        for joint in root.findall("joint"):
+            assert joint.find("mimic") is None, "mimic joints are not read here"
+            child = joint.find("child")
+            assert child is not None
+            self._above[str(child.get("link"))] = joint
+        self.names = [str(link.get("name")) for link in root.findall("link")]
+        self._steps = {name: self._way_to(name) for name in self.names}
+        self.bodies = {
+            str(link.get("name")): link_body(
+                [_part(item, path) for item in link.findall("collision") or link.findall("visual")]
+            )
+            for link in root.findall("link")
+        }
+
+    def body(self, name: str) -> LinkBody:
+        """The geometry of a link that has one."""
+        body = self.bodies[name]
+        assert body is not None, f"link {name} has no geometry"
+        return body
+
+    def pose(self, name: str, q: FloatArray) -> FloatArray:
+        """World pose (4, 4) of one link for actuator values (n,)."""
+        pose = self._base
+        for step in self._steps[name]:
+            pose = pose @ step.origin
+            if step.joint not in self._drives:
+                continue
+            joint = self._drives[step.joint]
+            value = joint_from_actuator(joint.drive, float(q[joint.actuator]))
+            pose = pose @ _moved(step, np.array([value]))[0]
+        return pose
+
+    def poses(self, q: FloatArray) -> dict[str, FloatArray]:
+        """World poses (k, 4, 4) of all links for actuator values (k, n)."""
+        turned: dict[str, FloatArray] = {}
+        for name, joint in self._drives.items():
+            values = q[:, joint.actuator].tolist()
+            turned[name] = np.array([joint_from_actuator(joint.drive, v) for v in values])
+        found = {}
+        for name in self.names:
+            pose = np.broadcast_to(self._base, (len(q), 4, 4))
+            for step in self._steps[name]:
+                pose = pose @ step.origin
+                if step.joint in turned:
+                    pose = pose @ _moved(step, turned[step.joint])
+            found[name] = pose
+        return found
+
+    def way(self, name: str, poses: FloatArray) -> FloatArray:
+        """Longest way (k - 1,) of any point of a link from each pose (k, 4, 4) to the next [m]."""
+        body = self.body(name)
+        moved = np.diff(poses, axis=0)
+        steps = body.hull @ moved[:, :3, :3].transpose(0, 2, 1) + moved[:, None, :3, 3]
+        longest = np.sqrt((steps * steps).sum(axis=2)).max(axis=1)
+        turned = np.sqrt((moved[:, :3, :3] ** 2).sum(axis=(1, 2)))
+        return np.asarray(longest + turned * body.reach)
+
+    def samples(self, start: FloatArray, displacement: FloatArray) -> FloatArray:
+        """Fractions so dense that no point moves more than about STEP_M between two."""
+        rough = np.linspace(0.0, 1.0, 400)
+        poses = self.poses(start + rough[:, None] * displacement)
+        ways = [self.way(name, poses[name]) for name in self.names if self.bodies[name]]
+        way = np.concatenate([[0.0], np.cumsum(np.max(ways, axis=0))])
+        count = max(int(np.ceil(way[-1] / STEP_M)) + 1, 2)
+        return np.asarray(np.interp(np.linspace(0.0, way[-1], count), way, rough))
+
+    def _way_to(self, name: str) -> list[_Step]:
+        joint = self._above.get(name)
+        if joint is None:
+            return []
+        parent = joint.find("parent")
+        assert parent is not None
+        element = joint.find("axis")
+        text = "1 0 0" if element is None else str(element.get("xyz"))
+        axis = np.array([float(x) for x in text.split()])
+        axis /= np.linalg.norm(axis)
+        slides = joint.get("type") == "prismatic"
+        step = _Step(_origin(joint.find("origin")), str(joint.get("name")), axis, slides)
+        return [*self._way_to(str(parent.get("link"))), step]
+
+
+def _moved(step: _Step, values: FloatArray) -> FloatArray:
+    """Motion (k, 4, 4) of a joint by values (k,)."""
+    moved = np.zeros((len(values), 4, 4))
+    moved[:, 3, 3] = 1.0
+    if step.slides:
+        moved[:, :3, :3] = np.eye(3)
+        moved[:, :3, 3] = values[:, None] * step.axis
+        return moved
+    x, y, z = step.axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    sine, cosine = np.sin(values)[:, None, None], np.cos(values)[:, None, None]
+    moved[:, :3, :3] = np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)
+    return moved
 
 
 def _origin(element: ET.Element | None) -> FloatArray:
@@ -35,141 +166,35 @@ def _origin(element: ET.Element | None) -> FloatArray:
     return pose
 
 
-def _number(element: ET.Element | None, key: str) -> float:
-    assert element is not None
-    return float(element.get(key, "nan"))
+def _part(item: ET.Element, urdf: Path) -> tuple[Surface, float]:
+    """Triangles in the link's frame and their thickness [m]."""
+    surface, radius = _shape(item.find("geometry"), urdf)
+    return surface.moved(_origin(item.find("origin"))), radius
 
 
-class DenseArm:
-    """Links as lists of (pose in the link, FCL shape, vertices), moved by its own kinematics."""
-
-    def __init__(self, description: ArmDescription) -> None:
-        path = Path(description.urdf)
-        root = ET.parse(path).getroot()  # noqa: S314  # our own files
-        self.description = description
-        self.joints = {joint.get("name"): joint for joint in root.findall("joint")}
-        self.names = [str(link.get("name")) for link in root.findall("link")]
-        self.shapes: dict[str, list[tuple[FloatArray, Any, FloatArray]]] = {}
-        for link in root.findall("link"):
-            found = link.findall("collision") or link.findall("visual")
-            self.shapes[str(link.get("name"))] = [
-                (_origin(item.find("origin")), *_shape(item.find("geometry"), path))
-                for item in found
-            ]
-
-    def joint_angles(self, q: FloatArray) -> dict[str, FloatArray]:
-        """Joint values (k,) by name for actuator values (k, n)."""
-        return {j.joint: joint_value(j.drive, q[:, j.actuator]) for j in self.description.joints}
-
-    def poses(self, q: FloatArray) -> dict[str, FloatArray]:
-        """World poses (k, 4, 4) of all links."""
-        angles = self.joint_angles(q)
-        parents = {j.find("child").get("link"): j for j in self.joints.values()}  # type: ignore[union-attr]
-        known: dict[str, FloatArray] = {}
-
-        def pose(name: str) -> FloatArray:
-            if name in known:
-                return known[name]
-            joint = parents.get(name)
-            if joint is None:
-                known[name] = np.broadcast_to(self.description.base_pose, (len(q), 4, 4))
-                return known[name]
-            parent = joint.find("parent")
-            assert parent is not None
-            value = angles.get(str(joint.get("name")), np.zeros(len(q)))
-            moved = np.broadcast_to(np.eye(4), (len(q), 4, 4)).copy()
-            axis_element = joint.find("axis")
-            text = "1 0 0" if axis_element is None else str(axis_element.get("xyz"))
-            axis = np.array([float(x) for x in text.split()])
-            axis /= np.linalg.norm(axis)
-            if joint.get("type") == "prismatic":
-                moved[:, :3, 3] = value[:, None] * axis
-            elif joint.get("type") != "fixed":
-                moved[:, :3, :3] = Rotation.from_rotvec(value[:, None] * axis).as_matrix()
-            known[name] = pose(str(parent.get("link"))) @ _origin(joint.find("origin")) @ moved
-            return known[name]
-
-        return {name: pose(name) for name in self.names}
-
-    def points(self, name: str, poses: FloatArray) -> FloatArray:
-        """Vertices of a link at each pose (k, v, 3)."""
-        vertices = [v @ o[:3, :3].T + o[:3, 3] for o, _, v in self.shapes[name]]
-        cloud = np.concatenate(vertices)
-        return np.asarray(np.einsum("kij,vj->kvi", poses[:, :3, :3], cloud) + poses[:, None, :3, 3])
-
-    def samples(self, start: FloatArray, displacement: FloatArray) -> FloatArray:
-        """Fractions so dense that no vertex moves more than about STEP_M between two."""
-        rough = np.linspace(0.0, 1.0, 200)
-        q = start + rough[:, None] * displacement
-        poses = self.poses(q)
-        longest = np.zeros(199)
-        for name in self.names:
-            if self.shapes[name]:
-                moved = np.linalg.norm(np.diff(self.points(name, poses[name]), axis=0), axis=2)
-                longest = np.maximum(longest, moved.max(axis=1))
-        way = np.concatenate([[0.0], np.cumsum(longest)])
-        count = int(np.ceil(way[-1] / STEP_M)) + 1
-        return np.asarray(np.interp(np.linspace(0.0, way[-1], max(count, 2)), way, rough))
-
-
-def _shape(geometry: ET.Element | None, urdf: Path) -> tuple[Any, FloatArray]:
+def _shape(geometry: ET.Element | None, urdf: Path) -> tuple[Surface, float]:
     assert geometry is not None
     box, ball = geometry.find("box"), geometry.find("sphere")
     tube, mesh = geometry.find("cylinder"), geometry.find("mesh")
     if box is not None:
-        size = np.array([float(x) for x in str(box.get("size")).split()])
-        return fcl.Box(*size), np.asarray(trimesh.creation.box(size).vertices)
+        return box_surface(np.array([float(x) for x in str(box.get("size")).split()])), 0.0
     if ball is not None:
-        radius = _number(ball, "radius")
-        return fcl.Sphere(radius), np.asarray(trimesh.creation.icosphere(radius=radius).vertices)
+        return segment(np.zeros(3), np.zeros(3)), float(str(ball.get("radius")))
     if tube is not None:
-        radius, length = _number(tube, "radius"), _number(tube, "length")
-        shape = trimesh.creation.cylinder(radius, length)
-        return fcl.Cylinder(radius, length), np.asarray(shape.vertices)
+        radius, length = float(str(tube.get("radius"))), float(str(tube.get("length")))
+        return cylinder_surface(radius, length), 0.0
     assert mesh is not None
-    loaded = trimesh.load_mesh(str(urdf.parent / str(mesh.get("filename"))))
-    return _bvh(loaded), np.asarray(loaded.vertices)
+    scale = np.array([float(x) for x in mesh.get("scale", "1 1 1").split()])
+    return read_surface(_found(str(mesh.get("filename")), urdf), scale), 0.0
 
 
-def _bvh(mesh: Any) -> Any:
-    model = fcl.BVHModel()
-    model.beginModel(len(mesh.vertices), len(mesh.faces))
-    model.addSubModel(mesh.vertices, mesh.faces)
-    model.endModel()
-    return model
-
-
-def shape_of(item: SolidObject, grow: float = 0.0) -> tuple[Any, float]:
-    """FCL object of a scene object grown by ``grow``, and the radius of a ball round it [m]."""
-    match item:
-        case Box():
-            size = np.array(item.size_m) + 2 * grow
-            pose = fcl.Transform(item.pose[:3, :3], item.pose[:3, 3])
-            return fcl.CollisionObject(fcl.Box(*size), pose), float(np.linalg.norm(size)) / 2
-        case Sphere():
-            where = fcl.Transform(np.eye(3), np.array(item.center_m))
-            radius = item.radius_m + grow
-            return fcl.CollisionObject(fcl.Sphere(radius), where), radius
-        case Cylinder():
-            radius, height = item.radius_m + grow, item.height_m + 2 * grow
-            pose = fcl.Transform(item.pose[:3, :3], item.pose[:3, 3])
-            return fcl.CollisionObject(fcl.Cylinder(radius, height), pose), radius + height
-        case Capsule():
-            a, b = np.array(item.start_m), np.array(item.end_m)
-            length = float(np.linalg.norm(b - a))
-            turn, _ = Rotation.align_vectors([(b - a) / length], [[0, 0, 1]])
-            pose = fcl.Transform(turn.as_matrix(), 0.5 * (a + b))
-            shape = fcl.Capsule(item.radius_m + grow, length)
-            return fcl.CollisionObject(shape, pose), item.radius_m + grow + length
-        case Mesh():
-            assert grow == 0.0
-            loaded = trimesh.load_mesh(item.file)
-            loaded.apply_scale(item.scale)
-            pose = fcl.Transform(item.pose[:3, :3], item.pose[:3, 3])
-            radius = float(np.linalg.norm(loaded.vertices, axis=1).max())
-            return fcl.CollisionObject(_bvh(loaded), pose), radius
-        case _:
-            raise NotImplementedError(item)
+def _found(name: str, urdf: Path) -> Path:
+    """package://NAME/REST is REST in the nearest folder above that has it."""
+    if not name.startswith("package://"):
+        return urdf.parent / name
+    package, _, rest = name.removeprefix("package://").partition("/")
+    above = urdf.resolve().parents
+    return next(f for a in above for f in (a / package / rest, a / rest) if f.is_file())
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,47 +206,29 @@ class Found:
 
 
 def first_contacts(
-    arm: DenseArm,
-    items: list[SolidObject],
-    start: FloatArray,
-    displacement: FloatArray,
-    *,
-    grow: float = 0.0,
+    arm: DenseArm, items: list[SolidObject], start: FloatArray, displacement: FloatArray
 ) -> list[Found | None]:
-    """First sampled contact with each object, each grown by ``grow`` (not meshes)."""
+    """First sampled contact with each object itself (margins aside), by `collide` alone."""
     fractions = arm.samples(start, displacement)
     poses = arm.poses(start + fractions[:, None] * displacement)
     answers: list[Found | None] = []
     for item in items:
-        body, ball = shape_of(item, grow)
-        center = np.asarray(body.getTranslation())
+        solid = Obstacle(item).solid
         best: tuple[int, str] | None = None
         for name in arm.names:
-            if name in item.ignore_links:
-                continue
-            for origin, shape, vertices in arm.shapes[name]:
-                pose = poses[name] @ origin
-                middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
-                radius = float(np.linalg.norm(vertices - middle, axis=1).max())
-                middles = pose[:, :3, :3] @ middle + pose[:, :3, 3]
-                near = np.linalg.norm(middles - center, axis=1) <= radius + ball + 0.01
-                moving = fcl.CollisionObject(shape)
-                for k in np.flatnonzero(near):
-                    if best is not None and k >= best[0]:
-                        break
-                    moving.setTransform(fcl.Transform(pose[k, :3, :3], pose[k, :3, 3]))
-                    if fcl.collide(moving, body, fcl.CollisionRequest(), fcl.CollisionResult()):
-                        best = int(k), name
-                        break
+            body = arm.bodies[name]
+            if body is not None and name not in item.ignore_links:
+                last = len(fractions) if best is None else best[0]
+                hit = _first_hit(body, solid, poses[name][:last])
+                best = best if hit is None else (hit, name)
         answers.append(None if best is None else Found(float(fractions[best[0]]), best[1]))
     return answers
 
 
-def farthest_motion(
-    arm: DenseArm, link: str, start: FloatArray, displacement: FloatArray, a: float, b: float
-) -> float:
-    """Length of the way of the farthest moving vertex of a link between two fractions [m]."""
-    fractions = np.linspace(a, b, 50)
-    poses = arm.poses(start + fractions[:, None] * displacement)[link]
-    steps = np.linalg.norm(np.diff(arm.points(link, poses), axis=0), axis=2)
-    return float(steps.sum(axis=0).max())
+def _first_hit(body: LinkBody, solid: fcl.CollisionObject, poses: FloatArray) -> int | None:
+    for k, pose in enumerate(poses):
+        for piece in body.pieces:
+            moving = piece.place_solid(pose)
+            if fcl.collide(moving, solid, fcl.CollisionRequest(), fcl.CollisionResult()):
+                return k
+    return None
