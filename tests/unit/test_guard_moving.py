@@ -264,3 +264,23 @@ def test_the_same_inputs_give_the_same_events() -> None:
         return repr(yard.events)
 
     assert run() == run()
+
+
+def test_a_pose_that_was_long_on_its_way_is_as_old_as_its_stamp_says() -> None:
+    yard, ahead_s = Yard(), 1.7e9
+
+    def step(now_s: float, sent_s: float, ahead_s: float) -> float | None:
+        stamp_s = now_s + ahead_s
+        stick = JoystickSample(stamp_s, np.zeros(1), now_s)
+        arm = ActuatorSample(stamp_s, np.zeros(1), None, now_s)
+        pose = seen(3.0, sent_s + ahead_s, now_s)
+        yard.guard.step(Inputs((stick,), (arm,), objects=(pose,)), now_s)
+        found = yard.sweeper.asked[-1]["truck"]
+        return None if found is None else found.grown_m
+
+    assert step(1.0, 0.7, ahead_s) == pytest.approx(0.6)  # 0.3 s old, 2 m/s
+    assert step(1.1, 1.1, ahead_s) == pytest.approx(0.0, abs=1e-3)
+    # all senders set their clock back, and are taken up again after their time-outs
+    late = [step(1.1 + 0.1 * k, 0.9 + 0.1 * k, 5.0) for k in range(1, 25)]
+    assert late[9] == pytest.approx(2.0, abs=5e-3)  # the newest good one is a second old
+    assert late[-1] == pytest.approx(0.4, abs=5e-3)
