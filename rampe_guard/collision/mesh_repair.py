@@ -38,15 +38,10 @@ def first_of_equal(rows: npt.NDArray[np.generic]) -> tuple[IntArray, IntArray]:
         rows: (n, 3) of an 8-byte type, compared by their bits.
     """
     words = np.ascontiguousarray(rows).view(np.uint64)
-    mixed = words[:, 0] * np.uint64(0x9E3779B97F4A7C15)
-    mixed ^= mixed >> np.uint64(29)
-    mixed += words[:, 1] * np.uint64(0xBF58476D1CE4E5B9)
-    mixed ^= mixed >> np.uint64(31)
-    mixed += words[:, 2] * np.uint64(0x94D049BB133111EB)
-    mixed ^= mixed >> np.uint64(32)
-    order = np.argsort(mixed, kind="stable")
-    same, mixed = _same_as_before(words[order]), mixed[order]
-    if ((mixed[1:] == mixed[:-1]) & ~same).any():  # different rows with one number
+    number = mixed(words)
+    order = np.argsort(number, kind="stable")
+    same, number = _same_as_before(words[order]), number[order]
+    if ((number[1:] == number[:-1]) & ~same).any():  # different rows with one number
         order = np.lexsort(words.T)
         same = _same_as_before(words[order])
     begins = np.concatenate([[True], ~same])
@@ -56,6 +51,17 @@ def first_of_equal(rows: npt.NDArray[np.generic]) -> tuple[IntArray, IntArray]:
     kind = np.empty(len(order), dtype=np.int64)
     kind[order] = rank[np.cumsum(begins) - 1]
     return np.sort(first), kind
+
+
+def mixed(words: npt.NDArray[np.uint64]) -> npt.NDArray[np.uint64]:
+    """A number of each row (n, 3), another one for almost every other row."""
+    number = words[:, 0] * np.uint64(0x9E3779B97F4A7C15)
+    number ^= number >> np.uint64(29)
+    number += words[:, 1] * np.uint64(0xBF58476D1CE4E5B9)
+    number ^= number >> np.uint64(31)
+    number += words[:, 2] * np.uint64(0x94D049BB133111EB)
+    number ^= number >> np.uint64(32)
+    return np.asarray(number)
 
 
 def _same_as_before(rows: npt.NDArray[np.uint64]) -> BoolArray:
@@ -101,12 +107,12 @@ def without_needles(vertices: FloatArray, faces: IntArray) -> Repaired:
     thin = needles(vertices, faces)
     if not thin.any():
         return faces, []
+    if thin.all():
+        return faces[:0], []
     # a needle bridges a vertex on another's edge: without it that edge would stand open
     before, after = (unbalanced(some, len(vertices)) for some in (faces, faces[~thin]))
     if int(after.sum()) > int(before.sum()):
         return faces, [f"{_count(int(thin.sum()))} without area kept: they bridge open edges"]
-    if thin.all():
-        return faces[:0], []
     return faces[~thin], [f"{_count(int(thin.sum()))} without area left out"]
 
 
