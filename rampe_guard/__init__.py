@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rampe_guard.assembly import Sweeper
     from rampe_guard.assembly import guard_for as Guard  # noqa: N812 - reads as a class in the API
     from rampe_guard.core.rampe import Rampe
-    from rampe_guard.core.types import ActuatorSample, Inputs, JoystickSample
+    from rampe_guard.core.types import ActuatorSample, Inputs, JoystickSample, ObjectSample
     from rampe_guard.errors import RampeGuardError, SettingsError
     from rampe_guard.settings import Site, load_site
 
@@ -31,6 +31,7 @@ _HOME = {
     "Guard": ("rampe_guard.assembly", "guard_for"),
     "Inputs": ("rampe_guard.core.types", "Inputs"),
     "JoystickSample": ("rampe_guard.core.types", "JoystickSample"),
+    "ObjectSample": ("rampe_guard.core.types", "ObjectSample"),
     "Rampe": ("rampe_guard.core.rampe", "Rampe"),
     "RampeGuardError": ("rampe_guard.errors", "RampeGuardError"),
     "SettingsError": ("rampe_guard.errors", "SettingsError"),
@@ -43,6 +44,7 @@ __all__ = [
     "Guard",
     "Inputs",
     "JoystickSample",
+    "ObjectSample",
     "Rampe",
     "RampeGuardError",
     "SettingsError",

@@ -11,6 +11,8 @@ Data walks one way through it::
             │ displacement (predictive distribution)
             ▼
     velocity ──► forecast (stopping, intent) ─► PathSweeper ─► alarm ─► events
+                                                     ▲
+    poses of objects ──► moving (where each may be) ─┘
 
 `guard.Guard.step` is the only composer; everything below it can be used alone.
 """
