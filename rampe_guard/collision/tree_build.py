@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 VERSION = 1
 """Of the trees built here: another one makes kept trees worthless."""
-HULLS = 1024
+HULLS = 512
 """Most nodes that are wrapped in a hull; those of fewest triangles get a box."""
 PASSED_ON = 200
 """A hull of more vertices is passed to the node above thinned out."""
