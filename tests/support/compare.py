@@ -9,6 +9,7 @@ import numpy as np
 
 from rampe_guard.core.types import Certificate
 from tests.support.motion import Motion
+from tests.support.obstacles import ERROR_M
 from tests.support.search import Sample, ZoneTruth
 
 if TYPE_CHECKING:
@@ -132,7 +133,7 @@ class Referee:
             enough = said + margin + self._config.clearance_tolerance_m
             found = truth.least(enough, enough=enough)
             true = found.distance - margin
-            if true > enough - margin + truth.obstacle.error_m + SLACK_M:
+            if true > enough - margin + ERROR_M + SLACK_M:
                 faults.append("loose")
         text = f"said {said:.6f} m, {_told(found, margin)}" if faults else ""
         return Verdict(
@@ -171,9 +172,9 @@ class Referee:
                 faults.append("early")
         elif not faults:
             near = margin + COMPLETE * tolerance
-            found = truth.least(near + truth.obstacle.error_m, enough=near)
+            found = truth.least(near + ERROR_M, enough=near)
             text += f", {_told(found, margin)}"
-            if found.distance > near + truth.obstacle.error_m:
+            if found.distance > near + ERROR_M:
                 faults.append("false")
         if not faults and not truth.contained(begin):
             there = (
@@ -181,7 +182,7 @@ class Referee:
                 if claim.link is None
                 else Sample(truth.distance(claim.link, called), called, claim.link)
             )
-            if there.distance > margin + COMPLETE * tolerance + truth.obstacle.error_m:
+            if there.distance > margin + COMPLETE * tolerance + ERROR_M:
                 faults.append("place")
                 text += f", {claim.link} is then at {there.distance - margin:.6f} m"
         return Verdict(

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).parents[2]
 ZX200 = ROOT / ".." / "shared" / "data" / "robots" / "zx200" / "urdf" / "zx200.urdf"
-NAMES = ("excavator", "zx200", "ur5", "six_axis")
+NAMES = ("excavator", "zx200", "ur5", "six_axis", "bench")
 
 
 class AbsentError(Exception):
@@ -37,6 +37,8 @@ def describe(name: str, folder: Path) -> tuple[ArmDescription, float]:
     match name:
         case "excavator":
             return load_site(ROOT / "config" / "sites" / "demo.yaml").arm, 8.5
+        case "bench":
+            return load_site(ROOT / "config" / "sites" / "bench.yaml").arm, 0.9
         case "zx200":
             if not ZX200.is_file():
                 raise AbsentError("no private robots beside the checkout")

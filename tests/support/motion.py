@@ -56,9 +56,9 @@ class Motion:
         """Way of the farthest moving point of a link from fraction a to b [m]."""
         return self.between(link, a, b) / SAFE
 
-    def farthest(self, link: str, direction: FloatArray) -> FloatArray:
-        """How far a link extends towards a direction (3,) at each grid sample (k + 1,) [m]."""
-        pose, body = self._grid[link], self._arm.body(link)
+    def farthest(self, link: str, direction: FloatArray, samples: slice) -> FloatArray:
+        """How far a link extends towards a direction (3,) at some of the grid samples [m]."""
+        pose, body = self._grid[link][samples], self._arm.body(link)
         local = direction @ pose[:, :3, :3]
         far = (local @ body.hull.T).max(axis=1) + body.reach
         return np.asarray(far + pose[:, :3, 3] @ direction)

@@ -1,4 +1,8 @@
-"""Exact keep-out objects for the oracle: distance to a link, and coarse bounds of many points."""
+"""Exact keep-out objects for the oracle: distance to a link, and coarse bounds of many points.
+
+Cylinders are prisms inscribed in them: a distance may be above the truth by ARROW_M, for a round
+link against a round object by twice that, and is never below it.
+"""
 
 from __future__ import annotations
 
@@ -27,6 +31,8 @@ if TYPE_CHECKING:
     from tests.support.bodies import LinkBody
 
 SLAB_M = 1000.0
+ERROR_M = 2.0 * ARROW_M
+"""How far a distance may be above the truth [m]."""
 _REQUEST = fcl.DistanceRequest(enable_nearest_points=True)
 
 
@@ -35,7 +41,6 @@ class Obstacle:
 
     Attributes:
         item: as in the scene.
-        error_m: how far `distance` may be above the truth [m]; it is never below it.
         solid: FCL object for `collide`.
         inner: points (p, 3) of it, one in each part [m].
         middle: about its middle (3,) [m].
@@ -43,7 +48,6 @@ class Obstacle:
 
     def __init__(self, item: SolidObject) -> None:
         self.item = item
-        self.error_m = ARROW_M if isinstance(item, Cylinder) else 0.0
         self.solid, self._body, self._thick, self.inner = _build(item)
         self._parts: list[Surface] = []
         self._box = (np.zeros(3), np.eye(4))

@@ -38,6 +38,7 @@ class Tally:
         motions: swept, each forwards, backwards and without sharp clearances.
         touching: zones that truly touch on the way, among all verdicts.
         contacts: zones called contact.
+        unlike: zones called otherwise backwards than forwards (right only near the tolerance).
         faults: broken promises by kind.
         answers: answers of ``any_path`` by kind.
         early, over, under: worst of `Verdict`; ``witness`` worst of `AnyVerdict`.
@@ -49,6 +50,7 @@ class Tally:
     verdicts: int = 0
     touching: int = 0
     contacts: int = 0
+    unlike: int = 0
     faults: dict[str, int] = field(default_factory=dict)
     answers: dict[str, int] = field(default_factory=dict)
     early: float = 0.0
@@ -64,6 +66,7 @@ class Tally:
         self.verdicts += other.verdicts
         self.touching += other.touching
         self.contacts += other.contacts
+        self.unlike += other.unlike
         for mine, its in ((self.faults, other.faults), (self.answers, other.answers)):
             for kind, count in its.items():
                 mine[kind] = mine.get(kind, 0) + count
@@ -105,11 +108,12 @@ def run_batch(
     *,
     only: int | None = None,
     motions: int = PER_BATCH,
+    config: SweepConfig | None = None,
 ) -> Tally:
     """All motions of a batch (or one of them, counted through all batches), judged."""
+    config = SweepConfig() if config is None else config
     rng = np.random.default_rng([seed, NAMES.index(machine.name), batch])
     made = make_batch(machine, kind_of(batch), rng, folder, motions)
-    config = SweepConfig()
     sweeper = FclSweeper(arm, Scene(made.items), config)
     obstacles = [Obstacle(item) for item in made.items]
     tally = Tally()
@@ -160,6 +164,8 @@ def _one(
     plain = sweeper.sweep(start, displacement, clearance=False)
     tally.motions += 1
     tally.times.append(there.elapsed_ms or 0.0)
+    pairs = zip(there.zones, back.zones, strict=True)
+    tally.unlike += sum(a.certificate is not b.certificate for a, b in pairs)
     where = f"{machine.name} case {case}"
     for verdict in referee.judge(there):
         tally.note(verdict, where)

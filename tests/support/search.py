@@ -127,10 +127,14 @@ class ZoneTruth:
         way = self._motion.way[link]
         here = float(np.interp(fraction, self._motion.at, way))
         bounds = distance - np.maximum(np.abs(way[:-1] - here), np.abs(way[1:] - here))
-        if whereto is not None:
-            gaps = -self.obstacle.support(-whereto) - self._motion.farthest(link, whereto)
-            np.maximum(bounds, 0.5 * (gaps[:-1] + gaps[1:] - np.diff(way)), out=bounds)
-        np.maximum(bounds, self._bounds[link], out=self._bounds[link])
+        np.maximum(bounds, self._bounds[link], out=bounds)
+        low = np.flatnonzero(bounds < distance)  # the others are no nearer than this one
+        if whereto is not None and low.size:
+            stretch, ends = slice(low[0], low[-1] + 1), slice(low[0], low[-1] + 2)
+            gaps = -self.obstacle.support(-whereto) - self._motion.farthest(link, whereto, ends)
+            gaps = 0.5 * (gaps[:-1] + gaps[1:] - np.diff(way[ends]))
+            np.maximum(bounds[stretch], gaps, out=bounds[stretch])
+        self._bounds[link][:] = bounds
         return Sample(distance, fraction, link)
 
     def _holds(self, link: str, fraction: float) -> bool:
