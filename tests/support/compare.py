@@ -151,7 +151,8 @@ class Referee:
     ) -> Verdict:
         margin, tolerance = truth.obstacle.item.margin_m, self._config.tolerance_m
         faults: list[str] = []
-        if claim.certificate is Certificate.UNKNOWN:
+        unknown = claim.certificate is Certificate.UNKNOWN
+        if unknown:
             faults.append("unknown")
         said = claim.contact_fraction
         called = begin if said is None else 1.0 - said if backwards else said
@@ -191,7 +192,7 @@ class Referee:
             first is not None,
             tuple(faults),
             text if faults else "",
-            early_m=early,
+            early_m=None if unknown else early,
         )
 
 
