@@ -24,7 +24,11 @@ if TYPE_CHECKING:
     from rampe_guard.errors import RampeGuardError, SettingsError
     from rampe_guard.settings import Site, load_site
 
+from rampe_guard.kernel_cache import choose_folder
+
 __version__ = "0.1.0"
+
+choose_folder()
 
 _HOME = {
     "ActuatorSample": ("rampe_guard.core.types", "ActuatorSample"),

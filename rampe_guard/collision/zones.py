@@ -1,61 +1,37 @@
-"""Scene objects to zones: convex pieces for the core, exact solids for FCL.
+"""Scene objects to zones: bounding trees for the sweep, exact FCL shapes for its confirmation.
 
-Spheres and capsules are a point or a segment with a radius: their distance is that of the core
-less the radius. Cylinders become prisms that contain them. A closed mesh is solid; an open one,
-like a terrain, is a surface with no inside.
+Spheres and capsules are a point or a segment with a radius, cylinders and halfspaces nodes of
+their own kind: all of them exact. A closed mesh is solid; one that the scene calls open, like a
+scanned terrain, is a surface with no inside.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 import fcl
 import numpy as np
 
-from rampe_guard.collision.mesh import TriangleMesh, checked_mesh, load_mesh, prism_mesh
-from rampe_guard.collision.pieces import cut, fcl_bvh, fcl_convex, piece_tree, speck
-from rampe_guard.core.convex import ConvexPiece, HalfspacePiece
+from rampe_guard.collision.mesh import checked_mesh, load_mesh
+from rampe_guard.collision.tree_build import build_tree
+from rampe_guard.core.bounding_tree import cylinder, halfspace, single
 from rampe_guard.core.kinematics import apply
 from rampe_guard.core.scene import Box, Capsule, Cylinder, Halfspace, Mesh, SolidObject, Sphere
-from rampe_guard.core.sweep_problem import PieceTree, Zone
+from rampe_guard.core.sweep_problem import Zone
 from rampe_guard.errors import GeometryError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from rampe_guard.core.bounding_tree import BoundingTree
     from rampe_guard.core.types import FloatArray
 
-PRISM_EXCESS_M = 1e-4
-"""How far the prism round a cylinder may bulge [m]; it is part of a contact's tolerance."""
-MAX_PRISM_SIDES = 720
-MESH_LEAVES = 512
-MESH_EXCESS_M = 0.002
-MESH_PIECES = 16
+CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+ROUNDING = 1e-6
 
 
-@dataclass(frozen=True, slots=True)
-class Solid:
-    """The exact shape of a zone: ``body`` (placed in the world) grown by ``radius`` [m].
-
-    Attributes:
-        body: FCL object; None for a halfspace, which needs none.
-        radius: [m].
-        inner: a point in each connected part of it (k, 3) [m].
-        closed: parts whose inside counts as the zone though FCL sees only their surface.
-    """
-
-    body: fcl.CollisionObject | None
-    radius: float
-    inner: FloatArray
-    closed: tuple[TriangleMesh, ...] = ()
-
-
-Built: TypeAlias = tuple[tuple[PieceTree, ...], Solid]
-
-
-def build_zone(item: SolidObject, link_names: Sequence[str]) -> tuple[Zone, Solid]:
-    """A zone and its exact solid.
+def build_zone(item: SolidObject, link_names: Sequence[str]) -> Zone:
+    """The zone of a scene object.
 
     Raises:
         GeometryError: naming the object and what is wrong with it.
@@ -67,80 +43,45 @@ def build_zone(item: SolidObject, link_names: Sequence[str]) -> tuple[Zone, Soli
         )
     if not (np.isfinite(item.margin_m) and item.margin_m >= 0.0):
         raise GeometryError(f"object '{item.name}' has margin_m {item.margin_m}; use 0 or more")
-    pieces, solid = _build(item)
     ignored = frozenset(link_names.index(name) for name in item.ignore_links)
-    return Zone(item.name, item.margin_m, pieces, ignored, hollow=bool(solid.closed)), solid
+    return Zone(item.name, item.margin_m, _tree(item), ignored, placed=item.key is not None)
 
 
-def _build(item: SolidObject) -> Built:
+def _tree(item: SolidObject) -> BoundingTree:
     match item:
         case Box():
-            return _box(item)
+            size, pose = _positive(item, item.size_m), _pose(item, item.pose)
+            return single(apply(pose, CORNERS * size))
         case Sphere():
-            return _round(item, item.center_m, item.center_m, item.radius_m)
+            (radius,) = _positive(item, [item.radius_m])
+            return single(_finite(item, item.center_m)[None], float(radius))
         case Capsule():
-            return _round(item, item.start_m, item.end_m, item.radius_m)
+            (radius,) = _positive(item, [item.radius_m])
+            ends = np.stack([_finite(item, item.start_m), _finite(item, item.end_m)])
+            return single(np.unique(ends, axis=0), float(radius))
         case Cylinder():
-            return _cylinder(item)
+            radius, height = (float(x) for x in _positive(item, [item.radius_m, item.height_m]))
+            pose = _pose(item, item.pose)
+            return cylinder(pose[:3, 3], 0.5 * height * pose[:3, 2], radius)
         case Halfspace():
             return _halfspace(item)
         case Mesh():
             return _mesh(item)
 
 
-def _box(item: Box) -> Built:
-    size, pose = _positive(item, item.size_m), _pose(item, item.pose)
-    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-    center, rotation = pose[:3, 3], pose[:3, :3]
-    piece = ConvexPiece(apply(pose, corners * size), center, rotation, 0.5 * size)
-    body = fcl.CollisionObject(fcl.Box(*size), fcl.Transform(rotation, center))
-    return (PieceTree(piece),), Solid(body, 0.0, center[None])
-
-
-def _round(item: Sphere | Capsule, start: Sequence[float], end: Sequence[float], r: float) -> Built:
-    (radius,) = _positive(item, [r])
-    a, b = _finite(item, start), _finite(item, end)
-    length = float(np.linalg.norm(b - a))
-    along = (b - a) / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
-    _, _, basis = np.linalg.svd(along[None])
-    half = np.array([0.5 * length, 0.0, 0.0])
-    core = np.stack([a, b]) if length > 0.0 else a[None]
-    piece = ConvexPiece(core, 0.5 * (a + b), basis.T, half, radius=float(radius))
-    body = fcl.CollisionObject(fcl_bvh(speck(a, b if length > 0.0 else None)))
-    return (PieceTree(piece),), Solid(body, float(radius), a[None])
-
-
-def _cylinder(item: Cylinder) -> Built:
-    radius, height = (float(x) for x in _positive(item, [item.radius_m, item.height_m]))
-    pose = _pose(item, item.pose)
-    sides = int(np.ceil(np.pi * np.sqrt(radius / (2.0 * PRISM_EXCESS_M))))
-    prism = prism_mesh(radius, height, int(np.clip(sides, 24, MAX_PRISM_SIDES)))
-    wide = float(np.abs(prism.vertices[:, 0]).max())
-    half = np.array([wide, wide, 0.5 * height])
-    vertices = apply(pose, prism.vertices)
-    piece = ConvexPiece(vertices, pose[:3, 3], pose[:3, :3], half)
-    return (PieceTree(piece),), Solid(
-        fcl.CollisionObject(fcl_convex(vertices)), 0.0, pose[None, :3, 3]
-    )
-
-
-def _halfspace(item: Halfspace) -> Built:
+def _halfspace(item: Halfspace) -> BoundingTree:
     normal, (offset,) = _finite(item, item.normal), _finite(item, [item.offset_m])
     norm = float(np.linalg.norm(normal))
-    if not abs(norm - 1.0) < 1e-6:  # noqa: PLR2004  # settings has normed it
+    if not abs(norm - 1.0) < ROUNDING:  # settings has normed it
         raise GeometryError(f"object '{item.name}' has a normal of length {norm:.6g}; norm it")
-    piece = HalfspacePiece(normal / norm, float(offset))
-    return (PieceTree(piece),), Solid(None, 0.0, np.zeros((0, 3)))
+    return halfspace(normal / norm, float(offset))
 
 
-def _mesh(item: Mesh) -> Built:
+def _mesh(item: Mesh) -> BoundingTree:
     (scale,) = _positive(item, [item.scale])
     placed = load_mesh(item.file).moved(_pose(item, item.pose), float(scale))
     mesh = checked_mesh(placed.vertices, placed.faces, f"object '{item.name}': {item.file}")
-    tree = piece_tree(mesh, MESH_EXCESS_M, MESH_LEAVES, measured=False)
-    pieces = tuple(cut(tree, MESH_PIECES))
     parts = mesh.components()
-    inner = np.array([part.vertices[0] for part in parts])
     closed = tuple(part for part in parts if part.is_closed())
     if len(closed) < len(parts):
         raise GeometryError(
@@ -148,7 +89,45 @@ def _mesh(item: Mesh) -> Built:
             " are not closed (an edge is open, or a triangle is turned over), so inside"
             " and outside cannot be told apart; close the mesh, or use boxes"
         )
-    return pieces, Solid(fcl.CollisionObject(fcl_bvh(mesh)), 0.0, inner, closed)
+    return build_tree(mesh)
+
+
+def exact_shape(item: SolidObject) -> fcl.CollisionObject | None:
+    """The same in FCL's own shapes, placed in the world; None where FCL has none to be trusted.
+
+    Halfspaces are not asked of FCL, and meshes are the business of `confirm`.
+    """
+    match item:
+        case Box():
+            return _object(fcl.Box(*item.size_m), item.pose)
+        case Sphere():
+            pose = np.eye(4)
+            pose[:3, 3] = item.center_m
+            return _object(fcl.Sphere(item.radius_m), pose)
+        case Cylinder():
+            return _object(fcl.Cylinder(item.radius_m, item.height_m), item.pose)
+        case Capsule():
+            a, b = np.array(item.start_m), np.array(item.end_m)
+            length = float(np.linalg.norm(b - a))
+            pose = np.eye(4)
+            pose[:3, 3] = 0.5 * (a + b)
+            if length == 0.0:
+                return _object(fcl.Sphere(item.radius_m), pose)
+            pose[:3, :3] = _turned_z((b - a) / length)
+            return _object(fcl.Capsule(item.radius_m, length), pose)
+        case _:
+            return None
+
+
+def _object(shape: fcl.CollisionGeometry, pose: FloatArray) -> fcl.CollisionObject:
+    return fcl.CollisionObject(shape, fcl.Transform(pose[:3, :3], pose[:3, 3]))
+
+
+def _turned_z(way: FloatArray) -> FloatArray:
+    """A rotation that takes z to a unit vector."""
+    side = np.cross(np.eye(3)[np.argmin(np.abs(way))], way)
+    side /= np.linalg.norm(side)
+    return np.column_stack([side, np.cross(way, side), way])
 
 
 def _finite(item: SolidObject, values: Sequence[float]) -> FloatArray:
@@ -168,6 +147,8 @@ def _positive(item: SolidObject, values: Sequence[float]) -> FloatArray:
 def _pose(item: SolidObject, pose: FloatArray) -> FloatArray:
     pose = np.asarray(pose, dtype=float)
     rotation = pose[:3, :3]
-    if not (np.isfinite(pose).all() and np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6)):
+    if not (
+        np.isfinite(pose).all() and np.allclose(rotation @ rotation.T, np.eye(3), atol=ROUNDING)
+    ):
         raise GeometryError(f"object '{item.name}' has a pose that is no rigid motion")
     return pose

@@ -2,14 +2,15 @@
 
 Node i is the set of all points within ``radius[i]`` of the hull of
 ``vertices[first[i] : first[i] + count[i]]``. It contains its children; a leaf with triangles
-contains those triangles; a leaf without is exact: it *is* that part of the solid. So whatever is
+contains those triangles; a leaf without is exact: it *is* that part of the solid. Two kinds of
+exact nodes are no hulls: see HALFSPACE and CYLINDER. So whatever is
 farther than d from a node is farther than d from the part of the surface under it, and following
 the nearest nodes down to the triangles ends in the exact distance.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -23,6 +24,10 @@ BoolArray: TypeAlias = npt.NDArray[np.bool_]
 
 NONE = -1
 """In ``left``, ``right``: no such child."""
+HALFSPACE = 0
+"""``count`` of a halfspace: vertices are its outward normal, then (offset, -, -)."""
+CYLINDER = -1
+"""``count`` of a cylinder: vertices are its center, half its axis, then (radius, -, -)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,3 +90,22 @@ def single(vertices: FloatArray, radius: float = 0.0) -> BoundingTree:
         enclosing=np.zeros(0, dtype=bool),
         inner=vertices[:1].copy(),
     )
+
+
+def cylinder(center: FloatArray, half_axis: FloatArray, radius: float) -> BoundingTree:
+    """The tree of one cylinder: center (3,), half its axis (3,), radius [m]."""
+    reach = float(np.hypot(np.linalg.norm(half_axis), radius))
+    vertices = np.array([center, half_axis, [radius, 0.0, 0.0]], dtype=float)
+    return _special(vertices, CYLINDER, np.array([[*center, reach]]), vertices[:1])
+
+
+def halfspace(normal: FloatArray, offset: float) -> BoundingTree:
+    """The tree of all x with normal·x <= offset [m]; no ball holds it."""
+    vertices = np.array([normal, [offset, 0.0, 0.0]], dtype=float)
+    return _special(vertices, HALFSPACE, np.array([[0.0, 0.0, 0.0, np.inf]]), vertices[:0])
+
+
+def _special(vertices: FloatArray, kind: int, ball: FloatArray, inner: FloatArray) -> BoundingTree:
+    plain = single(np.zeros((1, 3)))
+    count = np.array([kind], dtype=np.int32)
+    return replace(plain, vertices=vertices, count=count, ball=ball, inner=inner.copy())

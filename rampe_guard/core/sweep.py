@@ -2,174 +2,218 @@
 
 ::
 
-    path ─► poses on a grid ─► coarse bounds of all pairs at once ─► per zone: ZoneSearch
-                                                   └─► any monotone path: sweep_box
+    path ─► poses and motion bounds on a grid ─► coarse bounds of all pairs (search_kernel)
+         ─► walks of the pairs in doubt, nearest first (walk_kernel, which states the theorem)
+         ─► any monotone way: boxes in actuator space (box_kernel)
 
-Zones share one budget of clearance queries, spent on the nearest first.
+All zones share one budget of distance queries. This module is the front: it checks what is
+asked, runs the kernels, and puts their numbers into words.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rampe_guard.core.sweep_box import any_monotone_path
+from rampe_guard.core.arm_motion import PROBE_MOTION_M, valid_end
+from rampe_guard.core.bounding_tree import NONE
+from rampe_guard.core.search_kernel import FAR, Ask, search
 from rampe_guard.core.sweep_limit import sweep_limit
-from rampe_guard.core.sweep_path import SweptPath, swept_path, valid_end
-from rampe_guard.core.sweep_problem import Zone
-from rampe_guard.core.sweep_rows import Budget, Rows
-from rampe_guard.core.sweep_zone import ZoneSearch
-from rampe_guard.core.types import AnyPath, Certificate, SweepResult, ZoneSweep
+from rampe_guard.core.types import Certificate, SweepResult, ZoneSweep
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping
 
     from rampe_guard.core.config import SweepConfig
-    from rampe_guard.core.sweep_problem import ClearanceOracle, SweepProblem
-    from rampe_guard.core.types import FloatArray
+    from rampe_guard.core.kernel_data import Records
+    from rampe_guard.core.scene import ActuatorLimit
+    from rampe_guard.core.sweep_problem import SelfZone, SweepProblem, Zone
+    from rampe_guard.core.types import FloatArray, Placement
 
-COARSE_SAMPLES = 5
-STRAY_SHARE = 0.25
-"""Share of the clearance tolerance that links may stray from their chords between samples."""
+TOUCH_SHARE = 0.1
+"""Share of the contact tolerance that counts as contact until a look ahead refutes it."""
 
 
-def sweep(
-    problem: SweepProblem,
-    oracle: ClearanceOracle,
-    config: SweepConfig,
-    start: FloatArray,
-    displacement: FloatArray,
-    *,
-    clearance: bool = True,
-    any_path: bool = False,
-    only: frozenset[str] | None = None,
-) -> SweepResult:
-    """Sweep every link against every zone along start + s·displacement, 0 <= s <= 1.
+class Sweep:
+    """Sweeps of one problem. Not for several threads at once: the kernels' room is shared."""
 
-    Args:
-        problem: arm and zones.
-        oracle: geometry queries.
-        config: tolerances and budget.
-        start: actuator values (n,).
-        displacement: their change (n,).
-        clearance: also find each free zone's least clearance on the way; else the bound that
-            certified it is given, which may be far less.
-        any_path: also ask whether any monotone way to the end could touch.
-        only: names of the zones that are asked about; None asks about all.
+    def __init__(self, problem: SweepProblem, config: SweepConfig) -> None:
+        self.problem, self.config = problem, config
 
-    Returns:
-        One entry per zone asked about. A path that leaves the range in which the drives are
-        proven, or that is not finite, is unknown from there on.
+    def run(
+        self,
+        start: FloatArray,
+        displacement: FloatArray,
+        *,
+        clearance: bool = True,
+        only: frozenset[str] | None = None,
+        placed: Mapping[str, Placement | None] | None = None,
+        worst: bool = False,
+    ) -> SweepResult:
+        """Sweep every link against every zone along start + s·displacement, 0 <= s <= 1.
 
-    Raises:
-        ValueError: if a shape is wrong.
-    """
-    start = np.array(start, dtype=float)
-    displacement = np.array(displacement, dtype=float)
-    shape = problem.arm.lower.shape
-    if start.shape != shape or displacement.shape != shape:
-        raise ValueError(
-            f"start has shape {start.shape} and displacement {displacement.shape}; "
-            f"this arm has {shape[0]} actuators"
+        Args:
+            start: actuator values (n,).
+            displacement: their change (n,).
+            clearance: also find each free zone's least clearance on the way; else the bound that
+                certified it is given, which may be far less.
+            only: names of the zones that are asked about; None asks about all.
+            placed: where the zones that move are; None for one that nobody knows.
+            worst: only the worst of all solid zones is wanted: later contacts are not looked for.
+
+        Returns:
+            One entry per zone asked about, or the worst solid zone and the actuator limits. A
+            path that leaves the range in which the drives are proven, or that is not finite, is
+            unknown from there on.
+
+        Raises:
+            ValueError: if a shape is wrong.
+        """
+        problem = self.problem
+        start = np.array(start, dtype=float)
+        displacement = np.array(displacement, dtype=float)
+        shape = problem.arm.lower.shape
+        if start.shape != shape or displacement.shape != shape:
+            raise ValueError(
+                f"start has shape {start.shape} and displacement {displacement.shape}; "
+                f"this arm has {shape[0]} actuators"
+            )
+        asked = [i for i, zone in enumerate(problem.zones) if only is None or zone.name in only]
+        end = valid_end(problem.arm, start, displacement)
+        if end is None:
+            return SweepResult(zones=tuple(self._unfit(i, start, displacement) for i in asked))
+        zones, lost = self._place(placed or {}, asked)
+        found = self._search(zones, start, displacement, end, clearance=clearance, worst=worst)
+        moving = bool(displacement.any())
+        found = found.view(np.ndarray).tolist()
+        entries = []
+        group_of = {index: 0 if worst else number for number, index in enumerate(problem.solid)}
+        told = False
+        for index in asked:
+            zone = problem.zones[index]
+            if index not in group_of:
+                entries.append(sweep_limit(zone, start, displacement))  # type: ignore[arg-type]
+            elif index in lost:
+                entries.append(uncomputed(zone.name))
+            elif not worst:
+                entries.append(self._entry(zone, found[group_of[index]], end, moving=moving))  # type: ignore[arg-type]
+            elif not told:
+                entries.append(self._worst(found[0], end, moving=moving))
+                told = True
+        return SweepResult(zones=tuple(entries), queries=int(problem.scratch.spent[0]))
+
+    def _search(
+        self,
+        zones: Records,
+        start: FloatArray,
+        displacement: FloatArray,
+        end: float,
+        *,
+        clearance: bool,
+        worst: bool,
+    ) -> Records:
+        problem, config = self.problem, self.config
+        found = problem.found[worst]
+        path = problem.path
+        path.way[0], path.way[1], path.end[0] = start, displacement, end
+        if end == 0.0:  # the start is all that is known
+            path.way[1], path.end[0] = 0.0, 1.0
+        arm = problem.arm
+        fastest = float((np.abs(displacement)[arm.actuator] @ arm.coefficients).max(initial=0.0))
+        search(
+            problem.tables,
+            problem.shapes,
+            problem.pairs,
+            zones,
+            path,
+            problem.scratch,
+            problem.doubt,
+            found,
+            Ask(
+                tolerance=config.tolerance_m,
+                touch=TOUCH_SHARE * config.tolerance_m,
+                slack=config.clearance_tolerance_m if clearance else 10.0 * FAR,
+                probe=min(1.0, PROBE_MOTION_M / fastest) if fastest > 0.0 else 0.0,
+                limit=config.max_queries,
+                together=int(worst),
+                sharp=int(clearance),
+            ),
         )
-    end = valid_end(problem.arm, start, displacement)
-    asked = [i for i, zone in enumerate(problem.zones) if only is None or zone.name in only]
-    if end is None:
-        every = _without_geometry(problem, start, displacement)
-        zones = tuple(every[i] for i in asked)
-        return SweepResult(zones=zones, any_path=AnyPath.UNKNOWN if any_path else None)
-    budget = Budget(config.max_queries)
-    stray_m = STRAY_SHARE * config.clearance_tolerance_m
-    path = swept_path(problem.arm, start, displacement, end, stray_m)
-    found: dict[int, ZoneSweep] = {}
-    for index, zone, coarse in _by_distance(problem, path, asked):
-        least = float(coarse[0].min())
-        far = least > zone.margin_m + config.tolerance_m and path.end >= 1.0
-        if far and not (clearance or zone.hollow):
-            found[index] = _far(problem, index, zone, coarse, closing=bool(displacement.any()))
-        else:
-            rows = Rows(problem, index, path, oracle, budget, coarse)
-            search = ZoneSearch(zone, rows, config, problem.link_names)
-            found[index] = search.run(clearance=clearance)
-    for index in asked:
-        item = problem.zones[index]
-        if not isinstance(item, Zone):
-            found[index] = sweep_limit(item, start, displacement)
-        elif index not in found:
-            found[index] = _untouchable(item.name)
-    result = SweepResult(zones=tuple(found[i] for i in asked))
-    if any_path and result.certificate is Certificate.FREE:
-        answer = any_monotone_path(problem, oracle, config, start, displacement, budget)
-        result = replace(result, any_path=answer)
-    elif any_path:
-        touches = result.certificate is Certificate.CONTACT
-        result = replace(result, any_path=AnyPath.POSSIBLE if touches else AnyPath.UNKNOWN)
-    return replace(result, queries=budget.spent)
+        return found
 
+    def _place(
+        self, placed: Mapping[str, Placement | None], asked: list[int]
+    ) -> tuple[Records, set[int]]:
+        """The zones as they are now, and those of which nobody knows where they are."""
+        problem = self.problem
+        lost = {
+            i
+            for i in asked
+            if getattr(problem.zones[i], "placed", False)
+            and placed.get(problem.zones[i].name) is None
+        }
+        if not placed and not lost and len(asked) == len(problem.zones):
+            return problem.fixed, lost
+        zones = problem.fixed.copy()
+        wanted = set(asked) - lost
+        for number, index in enumerate(problem.solid):
+            zones.active[number] = index in wanted
+            where = placed.get(problem.zones[index].name)
+            if where is not None:
+                zones.pose[number] = where.pose[:3]
+                zones.margin[number] += where.grown_m
+        return zones, lost
 
-def _by_distance(
-    problem: SweepProblem, path: SweptPath, asked: Sequence[int]
-) -> list[tuple[int, Zone, tuple[FloatArray, FloatArray]]]:
-    """Solid zones asked about, nearest first, with bounds per row and cell, and at the start."""
-    if problem.coarse is None:
-        return []
-    K = path.cells
-    at = np.unique(np.linspace(0, K, min(COARSE_SAMPLES, K + 1)).round().astype(np.intp))
-    coarse = problem.coarse(
-        path.rotations[:, :, at].transpose(2, 1, 0, 3), path.translations[:, at].transpose(1, 0, 2)
-    )
-    moved = np.zeros((len(problem.solid_links), K + 1))
-    np.cumsum(path.motion[problem.solid_links], axis=1, out=moved[:, 1:])
-    way = np.diff(moved[:, at]).T[:, :, None]
-    blocks = np.repeat(0.5 * (coarse[:-1] + coarse[1:] - way), np.diff(at), axis=0)
-    blocks = np.moveaxis(blocks, 0, -1)
-    zones = []
-    for index in asked:
-        zone, table = problem.zones[index], problem.rows[index]
-        if isinstance(zone, Zone) and len(table.body):
-            way_of = blocks[table.body, table.obstacle]
-            zones.append((index, zone, (way_of, coarse[0, table.body, table.obstacle])))
-    return sorted(zones, key=lambda item: (float(item[2][0].min()), item[0]))
+    def _unfit(self, index: int, start: FloatArray, displacement: FloatArray) -> ZoneSweep:
+        """Actuator limits still have an answer if the numbers are finite; solid zones have none."""
+        zone = self.problem.zones[index]
+        finite = bool(np.isfinite(start).all() and np.isfinite(displacement).all())
+        if finite and index not in self.problem.solid:
+            return sweep_limit(zone, start, displacement)  # type: ignore[arg-type]
+        return uncomputed(zone.name)
 
+    def _worst(self, found: Records, end: float, *, moving: bool) -> ZoneSweep:
+        """The entry of all zones together."""
+        problem = self.problem
+        stop, *_, hit, nearest, _ = found
+        pair = int(hit[0]) if stop < np.inf else nearest
+        number = problem.pair_zone[pair] if pair != NONE else 0
+        zone = problem.zones[problem.solid[number]]
+        return self._entry(zone, found, end, moving=moving)  # type: ignore[arg-type]
 
-def _far(
-    problem: SweepProblem,
-    index: int,
-    zone: Zone,
-    coarse: tuple[FloatArray, FloatArray],
-    *,
-    closing: bool,
-) -> ZoneSweep:
-    """A zone that the coarse bounds alone prove free, and no link can be inside of."""
-    way, start = coarse
-    least = float(way.min())
-    row = int(np.argmin(way)) // way.shape[1]
-    return ZoneSweep(
-        zone=zone.name,
-        certificate=Certificate.FREE,
-        contact_fraction=None,
-        link=problem.link_names[int(problem.rows[index].link[row])],
-        contact_point_m=None,
-        clearance_m=least - zone.margin_m,
-        clearance_now_m=max(float(start.min()), least) - zone.margin_m,
-        closing=closing,
-        margin_m=zone.margin_m,
-    )
-
-
-def _without_geometry(
-    problem: SweepProblem, start: FloatArray, displacement: FloatArray
-) -> tuple[ZoneSweep, ...]:
-    """Actuator limits still have an answer if the numbers are finite; solid zones have none."""
-    finite = bool(np.isfinite(start).all() and np.isfinite(displacement).all())
-    return tuple(
-        sweep_limit(zone, start, displacement)
-        if finite and not isinstance(zone, Zone)
-        else uncomputed(zone.name)
-        for zone in problem.zones
-    )
+    def _entry(
+        self, zone: Zone | SelfZone, found: Records, end: float, *, moving: bool
+    ) -> ZoneSweep:
+        stop, _, bound, unproven, now, _, point, hit, nearest, closing = found
+        touched = stop < np.inf
+        if bound >= FAR and not touched and unproven == np.inf:
+            return untouchable(zone.name)
+        pair = int(hit[0]) if touched else nearest
+        link = None
+        if pair != NONE:
+            link = self.problem.link_names[self.problem.pair_link[pair]]
+        unknown = min(unproven, end if end < 1.0 else np.inf)
+        free = not touched and unknown == np.inf
+        fraction = None if free else min(stop, unknown)
+        least = 0.0 if touched else max(bound, 0.0) if free else None
+        known_now = now < FAR and (touched or unproven > 0.0)
+        x, y, z = point.tolist()
+        return ZoneSweep(
+            zone=zone.name,
+            certificate=Certificate.CONTACT
+            if touched
+            else Certificate.FREE
+            if free
+            else Certificate.UNKNOWN,
+            contact_fraction=fraction,
+            link=link,
+            contact_point_m=(x, y, z) if touched else None,
+            clearance_m=least,
+            clearance_now_m=now if known_now else None,
+            closing=bool(closing) and moving,
+            margin_m=zone.margin_m,
+        )
 
 
 def uncomputed(name: str) -> ZoneSweep:
@@ -186,7 +230,7 @@ def uncomputed(name: str) -> ZoneSweep:
     )
 
 
-def _untouchable(name: str) -> ZoneSweep:
+def untouchable(name: str) -> ZoneSweep:
     """Every link may touch this zone, or the arm has no geometry that could."""
     return ZoneSweep(
         zone=name,

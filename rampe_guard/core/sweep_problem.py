@@ -1,62 +1,34 @@
-"""What a sweep is asked about: pieces of links, pieces of zones, and who may touch whom."""
+"""What a sweep is asked about: trees of links, trees of zones, and who may touch whom."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rampe_guard.core.convex import CoarseBounds, ConvexPiece, IntArray, ObstaclePiece
+from rampe_guard.core.bounding_tree import NONE, BoundingTree, single
+from rampe_guard.core.arm_tables import arm_tables
+from rampe_guard.core.kernel_data import (
+    DOUBT,
+    GROUP,
+    MOVER,
+    PAIR,
+    SCRATCH,
+    ZONE,
+    Pairs,
+    Records,
+    empty_path,
+    room,
+    stack_trees,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Sequence
 
+    from rampe_guard.core.arm_motion import ArmMotion
     from rampe_guard.core.scene import ActuatorLimit
-    from rampe_guard.core.sweep_path import ArmMotion
-    from rampe_guard.core.types import FloatArray, Point
-
-
-@dataclass(frozen=True, slots=True)
-class Nearest:
-    """A distance that may be trusted [m], 0 in contact, and the nearest point of the zone."""
-
-    distance_m: float
-    point_m: Point
-
-
-class ClearanceOracle(Protocol):
-    """Geometry that the pure core cannot hold."""
-
-    def direction(
-        self, body: int, obstacle: int, pose: FloatArray, *, swapped: bool
-    ) -> FloatArray | None:
-        """A guess of the unit direction from a body at its link's ``pose`` to an obstacle piece.
-
-        It may be wrong: the sweep proves what it gives. None when they seem to overlap.
-        ``swapped`` asks the solver the other way round.
-        """
-        ...
-
-    def distance(self, link: int, zone: int, pose: FloatArray) -> Nearest:
-        """Distance of the exact surfaces [m]: never more than the truth."""
-        ...
-
-    def contained(self, link: int, zone: int, pose: FloatArray) -> Point | None:
-        """A point of one that lies inside the other while their surfaces are apart."""
-        ...
-
-    def boxed(self, zone: int, poses: FloatArray) -> frozenset[int]:
-        """Links that `contained` could say yes to at the poses (L, 4, 4): all others it denies."""
-        ...
-
-
-@dataclass(frozen=True, slots=True)
-class PieceTree:
-    """A convex shape that contains a part of a surface, and smaller ones that do so together."""
-
-    piece: ObstaclePiece
-    halves: tuple[PieceTree, ...] = ()
+    from rampe_guard.core.types import FloatArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,111 +38,153 @@ class Zone:
     Attributes:
         name: of the object.
         margin_m: keep-out distance [m].
-        pieces: trees of convex pieces (or one halfspace) that together contain it.
+        tree: its geometry, in the world, or in its own frame if it is ``placed``.
         ignored: indices of links that may touch it.
-        hollow: its inside counts, but its pieces hold no more than its surface.
+        placed: its pose comes with each sweep.
     """
 
     name: str
     margin_m: float
-    pieces: tuple[PieceTree, ...]
+    tree: BoundingTree
     ignored: frozenset[int] = frozenset()
-    hollow: bool = False
+    placed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
-class RowTable:
-    """The pairs of whole links and coarsest obstacle pieces of one zone that must stay apart.
+class SelfZone:
+    """A link that other links of the same arm must not touch.
 
     Attributes:
-        body, obstacle, link: of each row (H,).
-        of_obstacle: rows of all solid links (A,) against one obstacle piece.
-        solid: which of the solid links those are (A,).
+        name: of the zone.
+        margin_m: distance to keep [m].
+        link: index of that link.
+        others: indices of the links that must not touch it.
     """
 
-    body: IntArray
-    obstacle: IntArray
-    link: IntArray
-    of_obstacle: Mapping[int, IntArray]
-    solid: IntArray
+    name: str
+    margin_m: float
+    link: int
+    others: tuple[int, ...]
 
 
 class SweepProblem:
-    """An arm and its zones in the flat form the search works on.
-
-    Bodies are numbered with the hulls of whole links first, obstacles with all zones' coarsest
-    pieces first; what they are cut into follows.
+    """An arm and its zones in the flat form that the kernels work on, with room to work in.
 
     Attributes:
-        solid_links: indices of links with geometry; body i is the hull of solid link i.
-        bodies, obstacles: all convex shapes.
-        body_halves, obstacle_halves: what each is cut into, by number.
-        body_link: link of each body.
-        vertices: of each body (3, v) [m].
-        hull_vertices: of all hulls (S, 3, V) [m], filled up with repetitions.
-        coarse: bounds between all hulls and coarsest obstacle pieces; None without either.
-        rows: one table per zone.
+        arm: kinematics and motion bounds.
+        link_names: of all links.
+        zones: all of them, actuator limits too, in the order of the answers.
+        solid: index into ``zones`` of each zone with geometry.
+        tables, shapes, pairs: see `kernel_data`.
+        fixed: ZONE records of all solid zones, before anything is placed.
+        path, scratch, doubt: room of the kernels. found: their answers, about the worst of all
+            zones (True) or about each of them (False).
     """
 
     def __init__(
         self,
         arm: ArmMotion,
         link_names: Sequence[str],
-        links: Sequence[PieceTree | None],
-        zones: Sequence[Zone | ActuatorLimit],
+        links: Sequence[BoundingTree | None],
+        zones: Sequence[Zone | SelfZone | ActuatorLimit],
     ) -> None:
-        """``links``: one entry per link, None without geometry."""
+        """``links``: one tree per link in its own frame, None without geometry."""
         self.arm = arm
         self.link_names = tuple(link_names)
         self.zones = tuple(zones)
-        solid = [(link, tree) for link, tree in enumerate(links) if tree is not None]
-        self.solid_links = np.array([link for link, _ in solid], dtype=np.intp)
-        bodies, self.body_halves, roots = _flat([tree for _, tree in solid])
-        self.bodies = [body for body in bodies if isinstance(body, ConvexPiece)]
-        self.body_link = [solid[root][0] for root in roots]
-        self.vertices = [np.ascontiguousarray(body.vertices.T) for body in self.bodies]
-        hulls = self.vertices[: len(solid)]
-        most = max((block.shape[1] for block in hulls), default=1)
-        self.hull_vertices = np.array(
-            [np.pad(block, ((0, 0), (0, most - block.shape[1])), mode="edge") for block in hulls]
-        ).reshape(len(solid), 3, most)
-        trees = [tree for zone in zones if isinstance(zone, Zone) for tree in zone.pieces]
-        self.obstacles, self.obstacle_halves, _ = _flat(trees)
-        self.coarse = (
-            CoarseBounds(self.bodies[: len(solid)], self.solid_links, self.obstacles[: len(trees)])
-            if solid and trees
-            else None
+        self.solid = [i for i, zone in enumerate(zones) if isinstance(zone, (Zone, SelfZone))]
+        solid_links = [link for link, tree in enumerate(links) if tree is not None]
+        trees = [tree for tree in links if tree is not None]
+        objects = [zone for zone in zones if isinstance(zone, Zone)]
+        trees += [zone.tree for zone in objects]
+        self.shapes, roots = stack_trees(trees or [single(np.zeros((1, 3)))])
+        link_roots = [NONE] * len(links)
+        for link, root in zip(solid_links, roots, strict=False):
+            link_roots[link] = root
+        self.tables = arm_tables(arm, link_roots, [_capsule(tree) for tree in links])
+        object_root = dict(
+            zip((zone.name for zone in objects), roots[len(solid_links) :], strict=False)
         )
-        self.rows = self._row_tables()
-
-    def _row_tables(self) -> list[RowTable]:
-        tables = []
-        first = 0
-        for zone in self.zones:
-            count = len(zone.pieces) if isinstance(zone, Zone) else 0
-            ignored = zone.ignored if isinstance(zone, Zone) else frozenset()
-            allowed = [i for i, link in enumerate(self.solid_links) if int(link) not in ignored]
-            solid = np.array(allowed, dtype=np.intp)
-            obstacles = np.arange(first, first + count, dtype=np.intp)
-            body, obstacle = np.repeat(solid, count), np.tile(obstacles, len(solid))
-            of_obstacle = {int(o): np.flatnonzero(obstacle == o) for o in obstacles}
-            tables.append(RowTable(body, obstacle, self.solid_links[body], of_obstacle, solid))
-            first += count
-        return tables
+        enclosing = {
+            root: bool(tree.enclosing.any()) for root, tree in zip(roots, trees, strict=False)
+        }
+        self.fixed = room(ZONE, len(self.solid))
+        self.pairs = _pairs(self, links, object_root, enclosing)
+        self.pair_link: list[int] = self.pairs.row.link.tolist()
+        self.pair_zone: list[int] = self.pairs.row.zone.tolist()
+        self.path = empty_path(len(arm.joints), len(links), len(self.pairs.mover), len(arm.lower))
+        self.scratch = room(SCRATCH, 1)[0]
+        self.doubt = room(DOUBT, len(self.pairs.row))
+        self.found: dict[bool, Records] = {
+            True: room(GROUP, 1),
+            False: room(GROUP, len(self.solid)),
+        }
 
 
-def _flat(
-    trees: Sequence[PieceTree],
-) -> tuple[list[ObstaclePiece], list[tuple[int, ...]], list[int]]:
-    """Pieces of all trees, roots first; the numbers of each one's halves; each one's root."""
-    pieces: list[ObstaclePiece] = [tree.piece for tree in trees]
-    halves: list[tuple[int, ...]] = []
-    roots = list(range(len(trees)))
-    todo = list(trees)
-    for number, tree in enumerate(todo):  # grows as it goes
-        first = len(todo)
-        todo += tree.halves
-        pieces += [half.piece for half in tree.halves]
-        roots += [roots[number]] * len(tree.halves)
-        halves.append(tuple(range(first, len(todo))))
-    return pieces, halves, roots
+def _pairs(
+    problem: SweepProblem,
+    links: Sequence[BoundingTree | None],
+    object_root: dict[str, int],
+    enclosing: dict[int, bool],
+) -> Pairs:
+    arm = problem.arm
+    roots = problem.tables.link.root
+    rows: list[tuple[int, int, int, int, int]] = []  # link, other, b, common, zone
+    fixed = problem.fixed
+    fixed.pose, fixed.active = np.eye(4)[:3], 1
+    for number, index in enumerate(problem.solid):
+        fixed.first[number] = len(rows)
+        zone = problem.zones[index]
+        if isinstance(zone, SelfZone):
+            fixed.margin[number] = zone.margin_m
+            for link in zone.others:
+                if links[link] is not None and links[zone.link] is not None:
+                    common = arm.common_frame(link, zone.link)
+                    rows.append((link, zone.link, int(roots[zone.link]), common, number))
+        elif isinstance(zone, Zone):
+            fixed.margin[number] = zone.margin_m
+            for link, tree in enumerate(links):
+                if tree is not None and link not in zone.ignored:
+                    rows.append((link, NONE, object_root[zone.name], 0, number))
+        fixed.last[number] = len(rows)
+    movers: dict[tuple[int, int], int] = {}
+    for link, other, _, common, _ in rows:
+        movers.setdefault((link, common), len(movers))
+        if other != NONE:
+            movers.setdefault((other, common), len(movers))
+    order = sorted(movers)  # those of one link side by side
+    movers = {mover: number for number, mover in enumerate(order)}
+    row = room(PAIR, len(rows))
+    for pair, (link, other, b, common, number) in zip(row, rows, strict=True):
+        pair.link, pair.a, pair.other, pair.b = link, roots[link], other, b
+        pair.common, pair.zone = common, number
+        pair.mover = movers[link, common]
+        pair.other_mover = NONE if other == NONE else movers[other, common]
+        pair.hollow = enclosing[int(roots[link])] or enclosing[b]
+    mover = room(MOVER, len(order))
+    for one, (link, common) in zip(mover, order, strict=True):
+        one.link, one.common = link, common
+    return Pairs(row=row, mover=mover)
+
+
+def _capsule(tree: BoundingTree | None) -> FloatArray:
+    """Ends of a segment and a radius (7,) [m]; together they hold the root's shape."""
+    if tree is None:
+        return np.zeros(7)
+    points = tree.vertices[tree.first[0] : tree.first[0] + tree.count[0]]
+    center = points.mean(axis=0)
+    _, _, axes = np.linalg.svd(points - center, full_matrices=True)
+    best: tuple[float, FloatArray] | None = None
+    for axis in (*np.eye(3), *axes):
+        along = (points - center) @ axis
+        wide = float(np.linalg.norm(points - center - along[:, None] * axis, axis=1).max())
+        for share in (0.0, 0.5, 1.0):
+            low = min(along.min() + share * wide, 0.5 * (along.min() + along.max()))
+            high = max(along.max() - share * wide, low)
+            nearest = np.clip(along, low, high)[:, None] * axis + center
+            radius = float(np.linalg.norm(points - nearest, axis=1).max()) + tree.radius[0]
+            volume = np.pi * radius**2 * (high - low + 4.0 / 3.0 * radius)
+            if best is None or volume < best[0]:
+                ends = center + np.array([[low], [high]]) * axis
+                best = float(volume), np.append(ends.ravel(), radius * (1.0 + 1e-9))
+    return np.zeros(7) if best is None else best[1]

@@ -1,0 +1,165 @@
+"""Compiled: poses of one straight path on a grid, and how far links can move within its cells."""
+
+from __future__ import annotations
+
+import math
+import numpy as np
+
+from rampe_guard.core.arm_kernel import (
+    frames_of,
+    joints_at,
+    link_pose,
+    motion_bounds,
+    reaches,
+    relative,
+    slope_bounds,
+)
+from rampe_guard.core.compiled import inlined
+from rampe_guard.core.kernel_data import CELLS, ArmTables, Pairs, Path, Records, Shapes
+from rampe_guard.core.types import FloatArray
+
+
+@inlined
+def moved(pose: FloatArray, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """A point taken by a pose (3, 4)."""
+    return (
+        pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3],
+        pose[1, 0] * x + pose[1, 1] * y + pose[1, 2] * z + pose[1, 3],
+        pose[2, 0] * x + pose[2, 1] * y + pose[2, 2] * z + pose[2, 3],
+    )
+
+
+@inlined
+def lay_path(arm: ArmTables, S: Shapes, pairs: Pairs, path: Path) -> None:
+    """Fill in everything that depends on start, displacement and end.
+
+    Args:
+        arm: tables.
+        S: shapes.
+        pairs: for its movers.
+        path: way and end are set.
+    """
+    joints = len(arm.joint)
+    links = len(arm.link)
+    scratch = np.empty((3, 4))
+    pose = np.empty((3, 4))
+    moves = np.empty(joints)
+    reach = np.empty(joints)
+    least = np.empty(joints)
+    most = np.empty(joints)
+    size = np.empty(joints)
+    h = path.end[0] / CELLS
+    path.fastest[:] = 0.0
+    for c in range(CELLS + 1):
+        joints_at(arm, path.way, c * h, path.theta[c])
+        frames_of(arm, path.theta[c], path.frames[c], scratch)
+        for link in range(links):
+            if arm.link[link].root < 0:
+                continue
+            link_pose(arm, path.frames[c], link, pose)
+            for e in range(2):
+                end = arm.link[link].capsule[3 * e : 3 * e + 3]
+                x, y, z = moved(pose, end[0], end[1], end[2])
+                at = path.segment[link, c, 3 * e : 3 * e + 3]
+                at[0], at[1], at[2] = x, y, z
+    for j in range(joints):
+        size[j] = abs(path.way[1, arm.joint[j].actuator])
+    for c in range(CELLS):
+        for j in range(joints):
+            i = arm.joint[j].actuator
+            moves[j] = abs(path.theta[c + 1, j] - path.theta[c, j])
+            least[j], most[j] = slope_bounds(
+                arm,
+                j,
+                path.way[0, i] + c * h * path.way[1, i],
+                path.way[0, i] + (c + 1) * h * path.way[1, i],
+            )
+        known = -1
+        for m in range(len(pairs.mover)):
+            link = pairs.mover[m].link
+            if link != known:
+                ball = S.node[arm.link[link].root].ball
+                link_pose(arm, path.frames[c], link, pose)
+                x, y, z = moved(pose, ball[0], ball[1], ball[2])
+                reaches(arm, path.frames[c], link, (x, y, z, ball[3]), moves, reach)
+                known = link
+            rate, curvature, bend = motion_bounds(
+                arm, link, pairs.mover[m].common, reach, least, most, size
+            )
+            bounds = path.bounds[m, c]
+            bounds[0], bounds[1], bounds[2] = rate, curvature, bend
+            path.fastest[m] = max(path.fastest[m], rate)
+
+
+@inlined
+def move_to(arm: ArmTables, path: Path, s: float, scratch: FloatArray) -> None:
+    """Frames of the arm at fraction s, into ``path.now``."""
+    joints_at(arm, path.way, s, path.now_theta)
+    frames_of(arm, path.now_theta, path.now, scratch)
+
+
+@inlined
+def place(
+    arm: ArmTables,
+    frames: FloatArray,
+    pair: Records,
+    still: FloatArray,
+    pose_a: FloatArray,
+    pose_b: FloatArray,
+    scratch: FloatArray,
+) -> None:
+    """Poses of both sides of a pair in the frame that carries both.
+
+    Args:
+        arm: tables.
+        frames: of the arm (J + 1, 3, 4).
+        pair: the pair.
+        still: world pose (3, 4) of the zone, for pairs whose other side is no link.
+        pose_a, pose_b: results (3, 4).
+        scratch: (3, 4).
+    """
+    common = pair.common
+    if common == 0:
+        link_pose(arm, frames, pair.link, pose_a)
+        if pair.other < 0:
+            pose_b[:] = still
+        else:
+            link_pose(arm, frames, pair.other, pose_b)
+        return
+    link_pose(arm, frames, pair.link, scratch)
+    relative(frames[common], scratch, pose_a)
+    link_pose(arm, frames, pair.other, scratch)
+    relative(frames[common], scratch, pose_b)
+
+
+@inlined
+def pair_fastest(pair: Records, path: Path) -> float:
+    """Largest rate of both sides of a pair together on the whole path [m]."""
+    other = pair.other_mover
+    return path.fastest[pair.mover] + (path.fastest[other] if other >= 0 else 0.0)
+
+
+@inlined
+def pair_bounds(pair: Records, path: Path, c: int) -> tuple[float, float, float]:
+    """Rate, curvature and bend of both sides of a pair together in cell c."""
+    one = path.bounds[pair.mover, c]
+    rate, curvature, bend = one[0], one[1], one[2]
+    if pair.other_mover >= 0:
+        two = path.bounds[pair.other_mover, c]
+        rate += two[0]
+        curvature += two[1]
+        bend += two[2]
+    return rate, curvature, bend
+
+
+@inlined
+def capsule_distance(segment: FloatArray, radius: float, x: float, y: float, z: float) -> float:
+    """Distance of a point from a capsule: segment (6,), radius; may be negative inside [m]."""
+    ax, ay, az = segment[0], segment[1], segment[2]
+    bx, by, bz = segment[3] - ax, segment[4] - ay, segment[5] - az
+    px, py, pz = x - ax, y - ay, z - az
+    square = bx * bx + by * by + bz * bz
+    t = (px * bx + py * by + pz * bz) / square if square > 0.0 else 0.0
+    t = min(max(t, 0.0), 1.0)
+    px, py, pz = px - t * bx, py - t * by, pz - t * bz
+    return math.sqrt(px * px + py * py + pz * pz) - radius

@@ -1,0 +1,484 @@
+"""Compiled: one path against all zones. Coarse bounds of all pairs, then walks, nearest first.
+
+Coarse bounds are those of (link capsule, ball of the other side) at the ends of each cell of the
+path: between two samples a distance is at least (d_a + d_b - motion)/2. Halfspaces are bounded by
+the capsule's lower end. Only cells that these leave in doubt are walked.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from rampe_guard.core.bounding_tree import HALFSPACE
+from rampe_guard.core.compiled import compiled, inlined
+from rampe_guard.core.gjk import ROUNDING_M, halfspace_normal
+from rampe_guard.core.inside_kernel import inside
+from rampe_guard.core.kernel_data import CELLS, ArmTables, Pairs, Path, Records, Shapes
+from rampe_guard.core.path_kernel import (
+    capsule_distance,
+    lay_path,
+    move_to,
+    moved,
+    pair_bounds,
+    pair_fastest,
+    place,
+)
+from rampe_guard.core.types import FloatArray
+from rampe_guard.core.walk_kernel import EXACT, nearest, walk
+
+FAR = 1e30
+LADDER = (1.0, 1.0 / 30.0, 1.0 / 900.0)
+"""How near counts as a contact, in shares of ``touch``, as long as it is not confirmed."""
+NOISE_M = 1e-6
+
+
+class Ask(NamedTuple):
+    """What a sweep is asked.
+
+    Attributes:
+        tolerance: of a contact, in motion [m].
+        touch: a distance that counts as contact until it is refuted [m].
+        slack: to which distances are wanted [m]; more than FAR if any proof will do.
+        probe: fraction of the small first step that tells closing from opening.
+        limit: most queries.
+        together: 1 if only the worst of all zones is wanted.
+        sharp: 1 if the clearance at the start is wanted too.
+    """
+
+    tolerance: float
+    touch: float
+    slack: float
+    probe: float
+    limit: int
+    together: int
+    sharp: int
+
+
+@inlined
+def _coarse(
+    arm: ArmTables,
+    S: Shapes,
+    pairs: Pairs,
+    zones: Records,
+    path: Path,
+    k: Records,
+    doubt: Records,
+    found: Records,
+    ask: Ask,
+) -> None:
+    """Fill in ``doubt``; what is clear already only lowers the bounds of its group."""
+    h = path.end[0] / CELLS
+    d = np.empty(CELLS + 1)
+    near = ask.touch
+    count = 0
+    middle = CELLS // 2
+    for z in range(len(zones)):
+        if zones[z].active == 0 or zones[z].first == zones[z].last:
+            continue
+        g = 0 if ask.together == 1 else z
+        margin = zones[z].margin
+        p0 = zones[z].first
+        b = pairs.row[p0].b
+        plane = S.node[b].count == HALFSPACE
+        still = pairs.row[p0].other < 0
+        nx, ny, nz, floor = 0.0, 0.0, 0.0, 0.0
+        ox, oy, oz = 0.0, 0.0, 0.0
+        if plane:
+            nx, ny, nz, floor = halfspace_normal(S, S.node[b].first, zones[z].pose)
+        elif still:
+            center = S.node[b].ball
+            ox, oy, oz = moved(zones[z].pose, center[0], center[1], center[2])
+        for p in range(p0, zones[z].last):
+            link = pairs.row[p].link
+            radius = arm.link[link].capsule[6]
+            fastest = pair_fastest(pairs.row[p], path)
+            travel = 0.5 * path.end[0] * fastest
+            ball = S.node[pairs.row[p].b].ball
+            if still and not plane:
+                # one look at the middle of the path settles most
+                segment = path.segment[link, middle]
+                away = capsule_distance(segment, radius, ox, oy, oz) - ball[3] - travel - margin
+                if away > near and away > found[g].least - ask.slack and ask.sharp == 0:
+                    if away < found[g].bound:
+                        found[g].bound = away
+                        found[g].nearest = p
+                    found[g].now = min(found[g].now, away)
+                    continue
+            for c in range(CELLS + 1):
+                segment = path.segment[link, c]
+                if plane:
+                    first = nx * segment[0] + ny * segment[1] + nz * segment[2]
+                    second = nx * segment[3] + ny * segment[4] + nz * segment[5]
+                    d[c] = floor - max(first, second) - radius - margin
+                else:
+                    if not still:
+                        ox, oy, oz = _link_center(arm, path.frames[c], pairs.row[p].other, ball)
+                    d[c] = capsule_distance(segment, radius, ox, oy, oz) - ball[3] - margin
+            least = np.inf
+            for c in range(CELLS):
+                rate, _, _ = pair_bounds(pairs.row[p], path, c)
+                low = max(0.5 * (d[c] + d[c + 1] - rate * h), min(d[c], d[c + 1]) - rate * h)
+                doubt[count].cell[c] = low
+                least = min(least, low)
+            if least > near and ask.slack > FAR:
+                if least < found[g].bound:
+                    found[g].bound = least
+                    found[g].nearest = p
+                found[g].now = min(found[g].now, d[0])
+                continue
+            doubt[count].pair = p
+            doubt[count].least = least
+            doubt[count].start = d[0]
+            count += 1
+    k.doubts = count
+    _sort(doubt, count)
+
+
+@inlined
+def _sort(doubt: Records, count: int) -> None:
+    """Fill in the order of the list, nearest first (Shell's sort)."""
+    for i in range(count):
+        doubt[i].order = i
+    gap = count // 2
+    while gap > 0:
+        for i in range(gap, count):
+            entry = doubt[i].order
+            least = doubt[entry].least
+            j = i
+            while j >= gap and doubt[doubt[j - gap].order].least > least:
+                doubt[j].order = doubt[j - gap].order
+                j -= gap
+            doubt[j].order = entry
+        gap //= 2
+
+
+@inlined
+def _link_center(
+    arm: ArmTables, frames: FloatArray, link: int, ball: FloatArray
+) -> tuple[float, float, float]:
+    """World center of a link's ball."""
+    x, y, z = moved(arm.link[link].origin, ball[0], ball[1], ball[2])
+    return moved(frames[arm.link[link].frame], x, y, z)
+
+
+@inlined
+def _walk_all(
+    arm: ArmTables,
+    S: Shapes,
+    pairs: Pairs,
+    zones: Records,
+    path: Path,
+    k: Records,
+    doubt: Records,
+    found: Records,
+    ask: Ask,
+    begin: float,
+    touch: float,
+) -> None:
+    """Walk every doubtful pair (of group ``k.only`` if it is not negative) from a fraction on."""
+    h = path.end[0] / CELLS
+    for i in range(k.doubts):
+        d = doubt[i].order
+        p = doubt[d].pair
+        g = 0 if ask.together == 1 else pairs.row[p].zone
+        if k.only >= 0 and g != k.only:
+            continue
+        goal = max(touch, found[g].least - ask.slack)
+        first, last = -1, -1
+        passed = np.inf
+        for c in range(CELLS):
+            if (c + 1) * h <= begin and c < CELLS - 1:
+                continue
+            if doubt[d].cell[c] <= goal:
+                if first < 0:
+                    first = c
+                last = c
+        for c in range(CELLS):
+            if (first < 0 or c < first or c > last) and (c + 1) * h > begin:
+                passed = min(passed, doubt[d].cell[c])
+        if passed < found[g].bound:
+            found[g].bound = passed
+            if found[g].least >= FAR:
+                found[g].nearest = p
+        if first < 0:
+            continue
+        s0 = max(begin, first * h)
+        s1 = path.end[0] if last == CELLS - 1 else (last + 1) * h
+        if s0 >= found[g].stop:
+            continue
+        before = found[g].bound
+        walk(arm, S, pairs, zones, path, k, found, p, g, (s0, s1), (touch, ask.slack))
+        if found[g].bound < before and found[g].least >= FAR:
+            found[g].nearest = p
+
+
+@inlined
+def _seed(
+    arm: ArmTables,
+    S: Shapes,
+    pairs: Pairs,
+    zones: Records,
+    path: Path,
+    k: Records,
+    doubt: Records,
+    found: Records,
+    ask: Ask,
+) -> None:
+    """Meet small distances first: what is known not to be the least need not be walked sharply."""
+    for i in range(k.doubts):
+        d = doubt[i].order
+        p = doubt[d].pair
+        z = pairs.row[p].zone
+        g = 0 if ask.together == 1 else z
+        margin = zones[z].margin
+        for c in range(0, CELLS + 1, 2):
+            low = min(doubt[d].cell[max(c - 1, 0)], doubt[d].cell[min(c, CELLS - 1)])
+            if low >= found[g].least - ask.slack:
+                continue
+            limits = (found[g].least + margin, ask.slack, margin)
+            least = nearest(arm, S, pairs, path.frames[c], zones[z].pose, p, k, limits)
+            if math.isnan(least):
+                return
+            if least - margin < found[g].least:
+                found[g].least = max(least - margin, 0.0)
+                found[g].nearest = p
+
+
+@inlined
+def _contained(
+    arm: ArmTables,
+    S: Shapes,
+    pairs: Pairs,
+    zones: Records,
+    path: Path,
+    k: Records,
+    doubt: Records,
+    found: Records,
+    ask: Ask,
+) -> None:
+    """Contact at the start for a side that begins wholly inside the other.
+
+    Surfaces show nothing of that; later on the way it cannot come about without a contact.
+    """
+    for i in range(k.doubts):
+        p = doubt[i].pair
+        if pairs.row[p].hollow == 0 or doubt[i].start > 0.0:
+            continue
+        z = pairs.row[p].zone
+        g = 0 if ask.together == 1 else z
+        place(arm, path.frames[0], pairs.row[p], zones[z].pose, k.pose_a, k.pose_b, k.pose)
+        a, b = pairs.row[p].a, pairs.row[p].b
+        for side in range(2):
+            own, other = (a, b) if side == 0 else (b, a)
+            pose, frame = (k.pose_a, k.pose_b) if side == 0 else (k.pose_b, k.pose_a)
+            if S.node[own].count == HALFSPACE or S.node[other].count == HALFSPACE:
+                continue
+            for j in range(
+                S.node[own].inner_first, S.node[own].inner_first + S.node[own].inner_count
+            ):
+                x, y, w = moved(pose, S.inner[j, 0], S.inner[j, 1], S.inner[j, 2])
+                ux, uy, uz = x - frame[0, 3], y - frame[1, 3], w - frame[2, 3]
+                lx = frame[0, 0] * ux + frame[1, 0] * uy + frame[2, 0] * uz
+                ly = frame[0, 1] * ux + frame[1, 1] * uy + frame[2, 1] * uz
+                lz = frame[0, 2] * ux + frame[1, 2] * uy + frame[2, 2] * uz
+                if inside(S, other, lx, ly, lz):
+                    found[g].stop = 0.0
+                    found[g].hit[0], found.hit[g, 1], found.hit[g, 2] = p, a, b
+                    out = found[g].point
+                    out[0], out[1], out[2] = moved(path.frames[0, pairs.row[p].common], x, y, w)
+
+
+@inlined
+def _zone_distance(
+    arm: ArmTables,
+    S: Shapes,
+    pairs: Pairs,
+    zones: Records,
+    path: Path,
+    k: Records,
+    doubt: Records,
+    found: Records,
+    ask: Ask,
+    g: int,
+    s: float,
+    limits: tuple[float, float, float],
+) -> float:
+    """Least distance less margin of a group's doubtful pairs at a fraction; see `nearest`."""
+    known, slack, enough = limits
+    for i in range(k.doubts):
+        d = doubt[i].order
+        p = doubt[d].pair
+        z = pairs.row[p].zone
+        if (0 if ask.together == 1 else z) != g:
+            continue
+        if s == 0.0 and doubt[d].start >= known - slack:
+            continue
+        margin = zones[z].margin
+        move_to(arm, path, s, k.pose)
+        least = nearest(
+            arm,
+            S,
+            pairs,
+            path.now,
+            zones[z].pose,
+            p,
+            k,
+            (known + margin, slack, enough + margin),
+        )
+        if math.isnan(least):
+            return math.nan
+        if least - margin < known:
+            known = least - margin
+            found[g].nearest = p
+        if known <= enough:
+            break
+    return known
+
+
+@inlined
+def _start(
+    arm: ArmTables,
+    S: Shapes,
+    pairs: Pairs,
+    zones: Records,
+    path: Path,
+    k: Records,
+    doubt: Records,
+    found: Records,
+    ask: Ask,
+    g: int,
+) -> None:
+    """Clearance at the start and whether it is closing, of a group whose walks are done.
+
+    Inside the margin it is closing if any side that is inside comes nearer, or touches and does
+    not come off; outside, if the nearest one comes nearer.
+    """
+    touched = found[g].stop == 0.0
+    if touched or ask.sharp == 1:
+        found[g].closing = 0
+    best = 2.0 * ask.touch if touched else FAR
+    least = FAR
+    for i in range(k.doubts):
+        d = doubt[i].order
+        p = doubt[d].pair
+        z = pairs.row[p].zone
+        if (0 if ask.together == 1 else z) != g:
+            continue
+        if not touched and ask.sharp == 0:
+            found[g].now = min(found[g].now, doubt[d].start)
+            continue
+        if doubt[d].start >= best:
+            continue
+        margin = zones[z].margin
+        before, after = 0.0, 0.0
+        for look in range(2):
+            move_to(arm, path, 0.0 if look == 0 else ask.probe, k.pose)
+            limits = ((best if look == 0 else FAR) + margin, 0.0, 0.0)
+            away = nearest(arm, S, pairs, path.now, zones[z].pose, p, k, limits)
+            if math.isnan(away):
+                found[g].closing = 1
+                found[g].unproven = min(found[g].unproven, 0.0)
+                return
+            if look == 0:
+                before = away
+                if before - margin >= best:
+                    break
+            else:
+                after = away
+        if before - margin >= best:
+            continue
+        approaching = after < before - NOISE_M or (touched and max(before, after) <= NOISE_M)
+        least = min(least, before - margin)
+        if not touched:
+            best = least
+            found[g].closing = 1 if approaching else 0
+        elif approaching:
+            found[g].closing = 1
+    least -= EXACT * abs(least) + ROUNDING_M
+    if touched:
+        found[g].now = min(least, 2.0 * ask.touch)
+    else:
+        found[g].now = max(min(found[g].now, least), found[g].bound)
+
+
+@inlined
+def _refute(
+    arm: ArmTables,
+    S: Shapes,
+    pairs: Pairs,
+    zones: Records,
+    path: Path,
+    k: Records,
+    doubt: Records,
+    found: Records,
+    ask: Ask,
+    g: int,
+) -> bool:
+    """Look for group g's contact a little ahead; true if it is there, or can be no further."""
+    s = found[g].stop
+    if s == np.inf or s == 0.0:
+        return True
+    c = min(int(s * CELLS / path.end[0]), CELLS - 1)
+    rate, _, _ = pair_bounds(pairs.row[found[g].hit[0]], path, c)
+    ahead = min(s + (ask.tolerance / rate if rate > 0.0 else np.inf), path.end[0])
+    kept = found[g].nearest
+    limits = (ask.touch, 0.0, 0.0)  # nothing farther matters
+    there = _zone_distance(arm, S, pairs, zones, path, k, doubt, found, ask, g, ahead, limits)
+    found[g].nearest = kept
+    if there <= 0.0:
+        found[g].confirmed = ahead
+    return there <= 0.0 or math.isnan(there)
+
+
+@compiled
+def search(
+    arm: ArmTables,
+    S: Shapes,
+    pairs: Pairs,
+    zones: Records,
+    path: Path,
+    k: Records,
+    doubt: Records,
+    found: Records,
+    ask: Ask,
+) -> None:
+    """Sweep the path that is set in ``path`` against all active zones; fills ``found``."""
+    groups = len(found)
+    for g in range(groups):
+        found[g].stop = np.inf
+        found[g].least = FAR
+        found[g].bound = FAR
+        found[g].unproven = np.inf
+        found[g].nearest = -1
+        found[g].now = FAR
+        found[g].closing = 1
+        found[g].confirmed = math.nan
+    k.spent[0], k.spent[1] = 0, ask.limit
+    lay_path(arm, S, pairs, path)
+    _coarse(arm, S, pairs, zones, path, k, doubt, found, ask)
+    _contained(arm, S, pairs, zones, path, k, doubt, found, ask)
+    if ask.slack < FAR:
+        _seed(arm, S, pairs, zones, path, k, doubt, found, ask)
+    g, rung, begin = 0, 0, 0.0
+    k.only = -1
+    while True:  # all groups at first; then again each whose contact was refuted
+        touch = ask.touch * LADDER[rung]
+        _walk_all(arm, S, pairs, zones, path, k, doubt, found, ask, begin, touch)
+        while g < groups:
+            settled = _refute(arm, S, pairs, zones, path, k, doubt, found, ask, g)
+            if not settled and rung + 1 < len(LADDER):
+                break
+            g, rung = g + 1, 0
+        if g >= groups:
+            break
+        rung += 1
+        k.only = g
+        begin = found[g].stop
+        found[g].stop = np.inf
+        found[g].least = FAR
+    for g in range(groups):
+        if ask.sharp == 1 or found[g].bound < FAR or found[g].stop == 0.0:
+            _start(arm, S, pairs, zones, path, k, doubt, found, ask, g)

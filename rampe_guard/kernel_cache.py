@@ -1,0 +1,37 @@
+"""Where the compiled kernels of the sweep are kept.
+
+numba looks only at the file of the outermost kernel when it asks whether its machine code is
+still good. So the folder's name carries a digest of all kernels: change one, and all are
+compiled anew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from pathlib import Path
+
+KERNELS = ("*_kernel.py", "gjk.py", "kernel_data.py", "compiled.py")
+
+
+def choose_folder() -> None:
+    """Tell numba, unless the environment does; before it is imported.
+
+    Where no folder of the user's can be written, numba's own choice is left to it.
+    """
+    if "NUMBA_CACHE_DIR" in os.environ:
+        return
+    core = Path(__file__).parent / "core"
+    digest = hashlib.sha256()
+    for pattern in KERNELS:
+        for file in sorted(core.glob(pattern)):
+            digest.update(file.read_bytes())
+    chosen = os.environ.get("RAMPE_GUARD_CACHE")
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    folder = (Path(chosen) if chosen else home / "rampe-guard") / f"kernels-{digest.hexdigest()[:16]}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return
+    if os.access(folder, os.W_OK):
+        os.environ["NUMBA_CACHE_DIR"] = str(folder)
