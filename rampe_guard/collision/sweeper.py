@@ -15,7 +15,6 @@ from rampe_guard.core.config import SweepConfig
 from rampe_guard.core.scene import ActuatorLimit, Scene
 from rampe_guard.core.sweep import Sweep
 from rampe_guard.core.sweep_problem import SweepProblem, Zone
-from rampe_guard.core.types import AnyPath
 from rampe_guard.errors import GeometryError
 
 if TYPE_CHECKING:
@@ -86,10 +85,14 @@ class FclSweeper:
         """
         begin = perf_counter()
         result = self._sweep.run(
-            start, displacement, clearance=clearance, only=only, placed=placed, worst=worst
+            start,
+            displacement,
+            clearance=clearance,
+            any_path=any_path,
+            only=only,
+            placed=placed,
+            worst=worst,
         )
-        if any_path:
-            result = replace(result, any_path=AnyPath.UNKNOWN)
         return replace(result, elapsed_ms=1e3 * (perf_counter() - begin))
 
     def link_poses(self, actuators: FloatArray) -> FloatArray:

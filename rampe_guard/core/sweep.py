@@ -12,6 +12,7 @@ asked, runs the kernels, and puts their numbers into words.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,8 +20,9 @@ import numpy as np
 from rampe_guard.core.arm_motion import PROBE_MOTION_M, valid_end
 from rampe_guard.core.bounding_tree import NONE
 from rampe_guard.core.search_kernel import FAR, Ask, search
+from rampe_guard.core.sweep_box import AnyWay
 from rampe_guard.core.sweep_limit import sweep_limit
-from rampe_guard.core.types import Certificate, SweepResult, ZoneSweep
+from rampe_guard.core.types import AnyPath, Certificate, SweepResult, ZoneSweep
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -40,6 +42,7 @@ class Sweep:
 
     def __init__(self, problem: SweepProblem, config: SweepConfig) -> None:
         self.problem, self.config = problem, config
+        self._any_way = AnyWay(problem, config, TOUCH_SHARE * config.tolerance_m)
 
     def run(
         self,
@@ -47,6 +50,7 @@ class Sweep:
         displacement: FloatArray,
         *,
         clearance: bool = True,
+        any_path: bool = False,
         only: frozenset[str] | None = None,
         placed: Mapping[str, Placement | None] | None = None,
         worst: bool = False,
@@ -58,6 +62,7 @@ class Sweep:
             displacement: their change (n,).
             clearance: also find each free zone's least clearance on the way; else the bound that
                 certified it is given, which may be far less.
+            any_path: also ask whether any monotone way to the end could touch.
             only: names of the zones that are asked about; None asks about all.
             placed: where the zones that move are; None for one that nobody knows.
             worst: only the worst of all solid zones is wanted: later contacts are not looked for.
@@ -82,7 +87,10 @@ class Sweep:
         asked = [i for i, zone in enumerate(problem.zones) if only is None or zone.name in only]
         end = valid_end(problem.arm, start, displacement)
         if end is None:
-            return SweepResult(zones=tuple(self._unfit(i, start, displacement) for i in asked))
+            return SweepResult(
+                zones=tuple(self._unfit(i, start, displacement) for i in asked),
+                any_path=AnyPath.UNKNOWN if any_path else None,
+            )
         zones, lost = self._place(placed or {}, asked)
         found = self._search(zones, start, displacement, end, clearance=clearance, worst=worst)
         moving = bool(displacement.any())
@@ -101,7 +109,17 @@ class Sweep:
             elif not told:
                 entries.append(self._worst(found[0], end, moving=moving))
                 told = True
-        return SweepResult(zones=tuple(entries), queries=int(problem.scratch.spent[0]))
+        result = SweepResult(zones=tuple(entries), queries=int(problem.scratch.spent[0]))
+        if not any_path:
+            return result
+        answer, witness = self._any_way.answer(zones, result, start, displacement)
+        told_at = None if witness is None else tuple(witness.tolist())
+        return replace(
+            result,
+            any_path=answer,
+            witness=told_at,
+            queries=result.queries + int(problem.scratch.spent[0]),
+        )
 
     def _search(
         self,
@@ -185,7 +203,7 @@ class Sweep:
     def _entry(
         self, zone: Zone | SelfZone, found: Records, end: float, *, moving: bool
     ) -> ZoneSweep:
-        stop, _, bound, unproven, now, _, point, hit, nearest, closing = found
+        stop, _, bound, unproven, now, confirmed, point, hit, nearest, closing = found
         touched = stop < np.inf
         if bound >= FAR and not touched and unproven == np.inf:
             return untouchable(zone.name)
@@ -213,7 +231,15 @@ class Sweep:
             clearance_now_m=now if known_now else None,
             closing=bool(closing) and moving,
             margin_m=zone.margin_m,
+            confirmed_fraction=_confirmed(stop, confirmed),
         )
+
+
+def _confirmed(stop: float, confirmed: float) -> float | None:
+    """A contact at the start needs no look ahead."""
+    if stop == 0.0:
+        return 0.0
+    return confirmed if stop < np.inf and np.isfinite(confirmed) else None
 
 
 def uncomputed(name: str) -> ZoneSweep:

@@ -116,6 +116,8 @@ class ZoneSweep:
         clearance_now_m: the same at the start of the path; negative inside the margin.
         closing: the clearance shrinks at the start of the path.
         margin_m: the zone's own margin [m]; None for actuator limits.
+        confirmed_fraction: where, at most the tolerance of motion later, the contact was seen
+            to be one; None without contact or if it could be refuted no further.
     """
 
     zone: str
@@ -127,6 +129,7 @@ class ZoneSweep:
     clearance_now_m: float | None
     closing: bool
     margin_m: float | None = None
+    confirmed_fraction: float | None = None
 
     @property
     def inside(self) -> bool:
@@ -148,12 +151,15 @@ class SweepResult:
     Attributes:
         zones: one entry per zone, in scene order.
         any_path: answer for every monotone path, None when it was not asked.
+        witness: with ``any_path`` possible, actuator values (n,) between start and end at which
+            the arm touches.
         queries: clearance queries spent.
         elapsed_ms: time of the sweep alone [ms], None where no clock was at hand.
     """
 
     zones: tuple[ZoneSweep, ...]
     any_path: AnyPath | None = None
+    witness: tuple[float, ...] | None = None
     queries: int = 0
     elapsed_ms: float | None = None
 
