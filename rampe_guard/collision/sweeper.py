@@ -53,7 +53,8 @@ class FclSweeper:
             if isinstance(item, ActuatorLimit):
                 zones.append(_checked(item, len(arm.limits)))
             else:
-                zones.append(build_zone(item, arm.link_names))
+                built = build_zone(item, arm.link_names)
+                zones.append(built.zone)
         self._motion = motion
         self._sweep = Sweep(SweepProblem(motion, arm.link_names, links, zones), config)
 

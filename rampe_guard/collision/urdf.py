@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,11 +10,14 @@ import numpy as np
 import yourdfpy
 
 from rampe_guard.collision.mesh import (
+    LINK_MOST_M,
     TriangleMesh,
     ball_mesh,
     box_mesh,
+    check_extent,
     checked_mesh,
     load_mesh,
+    open_words,
     prism_mesh,
 )
 from rampe_guard.core.drive import actuator_value, domain
@@ -42,6 +45,7 @@ class Arm:
     Attributes:
         name: of the URDF.
         link_names: all links, parents first.
+        parents: per link the index of the link above it, -1 for the root.
         meshes: per link, in its own frame [m]; None for a link without geometry.
         chain: kinematics of all links.
         joint_names: movable joints, in the chain's order.
@@ -49,10 +53,12 @@ class Arm:
         fixed_joints: joints that could move but that nobody drives, and where they are held.
         limits: per actuator (n, 2) [unit]; infinite for an endless turn.
         proven: per actuator (n, 2): where its drives are proven monotone; holds the limits.
+        notes: sentences on what was mended or is remarkable in the meshes.
     """
 
     name: str
     link_names: tuple[str, ...]
+    parents: tuple[int, ...]
     meshes: tuple[TriangleMesh | None, ...]
     chain: Chain
     joint_names: tuple[str, ...]
@@ -60,6 +66,7 @@ class Arm:
     fixed_joints: Mapping[str, float]
     limits: FloatArray
     proven: FloatArray
+    notes: tuple[str, ...]
 
 
 def load_arm(description: ArmDescription) -> Arm:
@@ -81,6 +88,7 @@ def load_arm(description: ArmDescription) -> Arm:
     return Arm(
         name=str(robot.name),
         link_names=tuple(link.name for link in walk.links),
+        parents=tuple(walk.parents),
         meshes=meshes,
         chain=walk.chain(),
         joint_names=tuple(walk.joint_names),
@@ -88,6 +96,7 @@ def load_arm(description: ArmDescription) -> Arm:
         fixed_joints=walk.fixed,
         limits=limits,
         proven=proven,
+        notes=tuple(note for mesh in meshes if mesh is not None for note in mesh.notes),
     )
 
 
@@ -200,6 +209,7 @@ class _Walk:
 
     def __init__(self, robot: Any, maps: dict[str, JointMap], base: FloatArray, path: Path) -> None:
         self.links: list[Any] = []
+        self.parents: list[int] = []
         self.joint_names: list[str] = []
         self.fixed: dict[str, float] = {}
         self._parent: list[int] = []
@@ -222,14 +232,16 @@ class _Walk:
         roots = [name for name in links if name not in children]
         if len(roots) != 1:
             raise GeometryError(f"{path}: needs one root link, has {roots or 'a loop'}")
-        todo = [(roots[0], 0, np.asarray(base, dtype=float))]
+        todo = [(roots[0], -1, 0, np.asarray(base, dtype=float))]
         while todo:
-            name, frame, pose = todo.pop(0)
+            name, parent, frame, pose = todo.pop(0)
+            here = len(self.links)
             self.links.append(links[name])
+            self.parents.append(parent)
             self._frame.append(frame)
             self._pose.append(pose)
             todo += [
-                (joint.child, *self._follow(joint, frame, pose, maps, path))
+                (joint.child, here, *self._follow(joint, frame, pose, maps, path))
                 for joint in below[name]
             ]
         if len(self.links) != len(links):
@@ -295,7 +307,10 @@ def _link_mesh(link: Any, path: Path) -> TriangleMesh | None:
     offsets = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
     faces = np.concatenate([p.faces + o for p, o in zip(parts, offsets, strict=True)])
     vertices = np.concatenate([part.vertices for part in parts])
-    return checked_mesh(vertices, faces, f"{path}: link '{link.name}'")
+    notes = [note for part in parts for note in part.notes]
+    name = f"{path}: link '{link.name}'"
+    mesh = checked_mesh(vertices, faces, name, notes=notes)
+    return replace(mesh, notes=(*mesh.notes, *open_words(mesh, name)))
 
 
 def _shape_mesh(geometry: Any, link: str, path: Path) -> TriangleMesh:
@@ -305,8 +320,10 @@ def _shape_mesh(geometry: Any, link: str, path: Path) -> TriangleMesh:
         scale = 1.0 if geometry.mesh.scale is None else np.asarray(geometry.mesh.scale, dtype=float)
         if not (np.isfinite(scale).all() and np.all(scale != 0.0)):
             raise GeometryError(f"{where}: mesh {file} has scale {scale}")
-        mesh = load_mesh(file).moved(np.eye(4), scale)
-        return checked_mesh(mesh.vertices, mesh.faces, str(file))
+        mesh = load_mesh(file, np.array(np.broadcast_to(scale, 3)))
+        extent = float(np.ptp(mesh.vertices, axis=0).max())
+        said = check_extent(extent, f"{where}: {file}", LINK_MOST_M)
+        return replace(mesh, notes=(*mesh.notes, *said))
     if geometry.box is not None:
         sizes = np.asarray(geometry.box.size, dtype=float)
     elif geometry.cylinder is not None:

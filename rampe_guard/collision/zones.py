@@ -7,13 +7,16 @@ scanned terrain, is a surface with no inside.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import fcl
 import numpy as np
 
-from rampe_guard.collision.mesh import checked_mesh, load_mesh
-from rampe_guard.collision.tree_build import build_tree
+from rampe_guard.collision.mesh import ZONE_MOST_M
+from rampe_guard.collision.shape import placed
+from rampe_guard.collision.shape_cache import load_shape
 from rampe_guard.core.bounding_tree import cylinder, halfspace, single
 from rampe_guard.core.kinematics import apply
 from rampe_guard.core.scene import Box, Capsule, Cylinder, Halfspace, Mesh, SolidObject, Sphere
@@ -23,6 +26,8 @@ from rampe_guard.errors import GeometryError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from rampe_guard.collision.shape_cache import ShapeCache
+    from rampe_guard.collision.tree_split import Progress
     from rampe_guard.core.bounding_tree import BoundingTree
     from rampe_guard.core.types import FloatArray
 
@@ -30,8 +35,28 @@ CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in
 ROUNDING = 1e-6
 
 
-def build_zone(item: SolidObject, link_names: Sequence[str]) -> Zone:
+@dataclass(frozen=True, slots=True)
+class BuiltZone:
+    """A zone, and sentences on what was mended or is remarkable in its mesh."""
+
+    zone: Zone
+    notes: tuple[str, ...] = ()
+
+
+def build_zone(
+    item: SolidObject,
+    link_names: Sequence[str],
+    *,
+    cache: ShapeCache | None = None,
+    progress: Progress | None = None,
+) -> BuiltZone:
     """The zone of a scene object.
+
+    Args:
+        item: as the scene file describes it.
+        link_names: of the arm.
+        cache: where shapes of meshes are kept; None for the one that the environment names.
+        progress: told what is done, and which share of it.
 
     Raises:
         GeometryError: naming the object and what is wrong with it.
@@ -44,10 +69,16 @@ def build_zone(item: SolidObject, link_names: Sequence[str]) -> Zone:
     if not (np.isfinite(item.margin_m) and item.margin_m >= 0.0):
         raise GeometryError(f"object '{item.name}' has margin_m {item.margin_m}; use 0 or more")
     ignored = frozenset(link_names.index(name) for name in item.ignore_links)
-    return Zone(item.name, item.margin_m, _tree(item), ignored, placed=item.key is not None)
+    notes: tuple[str, ...] = ()
+    if isinstance(item, Mesh):
+        tree, notes = _mesh(item, cache, progress)
+    else:
+        tree = _tree(item)
+    zone = Zone(item.name, item.margin_m, tree, ignored, placed=item.key is not None)
+    return BuiltZone(zone, notes)
 
 
-def _tree(item: SolidObject) -> BoundingTree:
+def _tree(item: Box | Sphere | Capsule | Cylinder | Halfspace) -> BoundingTree:
     match item:
         case Box():
             size, pose = _positive(item, item.size_m), _pose(item, item.pose)
@@ -65,8 +96,6 @@ def _tree(item: SolidObject) -> BoundingTree:
             return cylinder(pose[:3, 3], 0.5 * height * pose[:3, 2], radius)
         case Halfspace():
             return _halfspace(item)
-        case Mesh():
-            return _mesh(item)
 
 
 def _halfspace(item: Halfspace) -> BoundingTree:
@@ -77,19 +106,38 @@ def _halfspace(item: Halfspace) -> BoundingTree:
     return halfspace(normal / norm, float(offset))
 
 
-def _mesh(item: Mesh) -> BoundingTree:
+def _mesh(
+    item: Mesh, cache: ShapeCache | None, progress: Progress | None
+) -> tuple[BoundingTree, tuple[str, ...]]:
+    """The tree of a mesh, and what there is to say about it."""
     (scale,) = _positive(item, [item.scale])
-    placed = load_mesh(item.file).moved(_pose(item, item.pose), float(scale))
-    mesh = checked_mesh(placed.vertices, placed.faces, f"object '{item.name}': {item.file}")
-    parts = mesh.components()
-    closed = tuple(part for part in parts if part.is_closed())
-    if len(closed) < len(parts):
+    pose, name = _pose(item, item.pose), f"object '{item.name}': {item.file}"
+    shape = load_shape(
+        item.file,
+        float(scale),
+        name=name,
+        most_m=ZONE_MOST_M,
+        cache=cache,
+        progress=None if progress is None else about(progress, Path(item.file).name),
+    )
+    tree, notes = placed(shape.tree, pose), shape.notes
+    if item.open:
+        if shape.closed:
+            notes = (*notes, f"{name}: is closed, yet 'open' takes its inside for free space")
+        return replace(tree, enclosing=np.zeros_like(tree.enclosing)), notes
+    if not shape.closed:
         raise GeometryError(
-            f"object '{item.name}': {item.file}: {len(parts) - len(closed)} of {len(parts)} parts"
+            f"{name}: {shape.parts - shape.closed_parts} of {shape.parts} parts"
             " are not closed (an edge is open, or a triangle is turned over), so inside"
-            " and outside cannot be told apart; close the mesh, or use boxes"
+            " and outside cannot be told apart; close the mesh, use boxes, or say 'open: true'"
+            " if it is a surface without an inside, such as a scanned terrain"
         )
-    return build_tree(mesh)
+    return tree, notes
+
+
+def about(progress: Progress, what: str) -> Progress:
+    """The same, told of which mesh it is."""
+    return lambda doing, share: progress(f"{doing} {what}", share)
 
 
 def exact_shape(item: SolidObject) -> fcl.CollisionObject | None:

@@ -79,11 +79,15 @@ class Halfspace(KeepOut):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mesh(KeepOut):
-    """Triangle mesh read from ``file``, scaled by ``scale``, placed at ``pose``."""
+    """Triangle mesh read from ``file``, scaled by ``scale``, placed at ``pose``.
+
+    ``open``: it is a surface without an inside, such as a scanned terrain; else a solid.
+    """
 
     file: str
     scale: float
     pose: FloatArray
+    open: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

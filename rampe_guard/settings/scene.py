@@ -205,7 +205,8 @@ class _Builder:
         file = existing_file(self._problems, key, self._directory, item.file, "mesh file")
         if file is None:
             return None
-        return Mesh(**common, file=file, scale=item.scale, pose=pose_matrix(item.pose))
+        pose = pose_matrix(item.pose)
+        return Mesh(**common, file=file, scale=item.scale, pose=pose, open=item.open)
 
     def _limit(self, item: models.ActuatorLimitModel, where: KeyPath) -> ActuatorLimit | None:
         if item.actuator not in self._actuators:

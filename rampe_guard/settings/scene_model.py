@@ -102,6 +102,11 @@ class MeshModel(MovableModel):
     file: Text = Field(description="The mesh file (STL, OBJ or PLY), relative to this file.")
     scale: Length = Field(default=1.0, description="The factor from the file's unit to metres [-].")
     pose: Pose = Field(default=Pose(), description="The pose of the mesh in the world.")
+    open: bool = Field(
+        default=False,
+        description="True for a surface without an inside, such as a scanned terrain: only its "
+        "triangles are kept clear of. False for a solid, whose mesh must be closed.",
+    )
 
 
 class ActuatorLimitModel(_Object):

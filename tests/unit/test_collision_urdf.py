@@ -162,6 +162,21 @@ def test_drives_that_do_not_fit_are_named(tmp_path: Path) -> None:
         load_arm(twice)
 
 
+def test_meshes_of_links_keep_their_notes_and_millimetres_are_refused(tmp_path: Path) -> None:
+    box = box_triangles((1, 1, 1))
+    write_stl(tmp_path / "b.stl", np.concatenate([box[1:], box[-1:]]))
+    body = f'<link name="a"/><link name="b">{MESH.format("b.stl")}</link>{TURN}'
+    arm = load_arm(describe(_write(tmp_path, body), ["turn"]))
+    assert arm.notes == (
+        f"{tmp_path / 'b.stl'}: 1 triangle given twice left out",
+        f"{tmp_path / 'arm.urdf'}: link 'b': it is not closed: a surface without an inside",
+    )
+    assert arm.parents == (-1, 0)
+    write_stl(tmp_path / "b.stl", 1e3 * box)
+    with pytest.raises(GeometryError, match=r"link 'b': .*b\.stl: is 1000 m long.*millimetre"):
+        load_arm(describe(_write(tmp_path, body), ["turn"]))
+
+
 @pytest.mark.skipif(not ZX200.exists(), reason="the public excavator model is not beside us")
 @pytest.mark.private_data
 def test_a_public_excavator_model_loads() -> None:

@@ -32,7 +32,7 @@ objects:
   - {name: ground, type: halfspace, normal: [0, 0, 2], offset_m: 1, margin_m: 0,
      ignore_links: [bucket, track]}
   - {name: ball, type: sphere, radius_m: 1, center: [1, 2, 3]}
-  - {name: terrain, type: mesh, file: ground.stl, scale: 0.001}
+  - {name: terrain, type: mesh, file: ground.stl, scale: 0.001, open: true}
   - {name: road-side, type: actuator_limit, actuator: boom, above: 1.2, below: -1}
 """
 
@@ -68,6 +68,7 @@ def test_every_kind_of_object(tmp_path: Path) -> None:
     assert ball == Sphere(name="ball", margin_m=0.3, radius_m=1, center_m=(1, 2, 3))
     assert isinstance(terrain, Mesh)
     assert (terrain.file, terrain.scale) == (str(tmp_path / "ground.stl"), 0.001)
+    assert terrain.open
     assert road == ActuatorLimit(name="road-side", actuator=1, above=1.2, below=-1)
     assert scene.path == str(tmp_path / "scene.yaml")
     assert scene.content_hash == hashlib.sha256(ALL.encode() + b"solid").hexdigest()
