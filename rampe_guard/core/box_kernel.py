@@ -29,8 +29,8 @@ from rampe_guard.core.types import FloatArray
 from rampe_guard.core.walk_kernel import LOOSE, can_split, push_halves, radius_of, shape_of
 
 FREE, POSSIBLE, UNKNOWN = range(3)
-BOXES = 256
-"""Boxes that may wait; each halving of one leaves one more."""
+BOXES = 1024
+"""Boxes that may wait."""
 SHARE = 1e-3
 
 
@@ -108,8 +108,11 @@ def _decide(
     moves: FloatArray,
     reach: FloatArray,
     k: Records,
-) -> int:
-    """Whether one pair is clear in a box (FREE), touches at its center (POSSIBLE), or neither."""
+) -> tuple[int, float]:
+    """Whether one pair is clear in a box (FREE), touches at its center (POSSIBLE), or neither.
+
+    And for neither, how near it is to a contact there [m].
+    """
     place(arm, frames, pair, zone.pose, k.pose_a, k.pose_b, k.pose)
     link = pair.link
     link_pose(arm, frames, link, k.pose)
@@ -129,19 +132,19 @@ def _decide(
     k.at[0, 1], k.at[0, 2], k.at[0, 3] = way[0], way[1], way[2]
     k.far[1] = 0.0
     top, first = 1, True
-    verdict = FREE
+    verdict, near = FREE, np.inf
     if pair.other < 0 and S.node[pair.b].count != HALFSPACE:
         other = S.node[pair.b].ball
         ox, oy, oz = moved(k.pose_b, other[0], other[1], other[2])
         away = math.sqrt((x - ox) ** 2 + (y - oy) ** 2 + (z - oz) ** 2) - ball[3] - other[3]
         if away - margin > travel:
-            return FREE
+            return FREE, np.inf
     while top > 0:
         top -= 1
         a, b = k.node[top, 0], k.node[top, 1]
         n = (k.at[top, 1], k.at[top, 2], k.at[top, 3])
         if k.spent[0] >= k.spent[1]:
-            return UNKNOWN
+            return UNKNOWN, 0.0
         k.spent[0] += 1
         rounding = radius_of(S, a) + radius_of(S, b) + margin
         leaf = not (can_split(S, a) or can_split(S, b))
@@ -162,12 +165,13 @@ def _decide(
         if not leaf:
             top = push_halves(S, k, top, a, b, 0.0, (nx, ny, nz), travel + margin)
             if top < 0:
-                return UNKNOWN
+                return UNKNOWN, 0.0
             continue
         if upper - rounding <= 0.0:
-            return POSSIBLE
+            return POSSIBLE, 0.0
         verdict = UNKNOWN  # go on: another part may touch at the center
-    return verdict
+        near = min(near, upper - rounding)
+    return verdict, near
 
 
 @compiled
@@ -191,7 +195,8 @@ def any_way(
         k: scratch; ``spent`` is set.
         box: room for boxes (BOXES, 2, n); the witness is left in box[0, 0].
         pool: room for numbers of pairs (any length).
-        span: room (BOXES, 2): first and count of each box's pairs in the pool.
+        span: room (BOXES, 3): first and count of each box's pairs in the pool, and how near a
+            contact was at the center of the box that it is a half of.
         finest: boxes in which links move less than this are not halved again [m].
     """
     actuators = box.shape[2]
@@ -208,39 +213,47 @@ def any_way(
         a, b = path.way[0, i], path.way[0, i] + path.way[1, i]
         box[0, 0, i] = min(max(min(a, b), arm.limits[0, i]), arm.limits[1, i])
         box[0, 1, i] = min(max(max(a, b), arm.limits[0, i]), arm.limits[1, i])
-    span[0, 0], span[0, 1] = 0, count
-    top = 1
+    span[0, 0], span[0, 1], span[0, 2] = 0, count, 0.0
+    top, used = 1, count
+    verdict = FREE
     while top > 0:
+        # the box that came nearest to a contact goes first: if there is one, it is soon found
+        best = top - 1
+        for m in range(top - 1):
+            if span[m, 2] < span[best, 2]:
+                best = m
+        here = box[best].copy()
+        first, many = int(span[best, 0]), int(span[best, 1])
         top -= 1
-        first, many = int(span[top, 0]), int(span[top, 1])
+        box[best] = box[top]
+        span[best] = span[top]
         for j in range(joints):
             i = arm.joint[j].actuator
-            low, high = box[top, 0, i], box[top, 1, i]
+            low, high = here[0, i], here[1, i]
             theta[j] = joint_value(arm, j, 0.5 * (low + high))
             moves[j] = max(
                 abs(joint_value(arm, j, low) - theta[j]), abs(joint_value(arm, j, high) - theta[j])
             )
         frames_of(arm, theta, path.now, k.pose)
-        end = first + many
-        if end + many > len(pool):
+        if used + many > len(pool) or top + 2 > len(box):
             return UNKNOWN
-        left = 0
-        widest, most = -1, 0.0
-        for m in range(first, end):
+        left, widest, most, nearest = 0, -1, 0.0, np.inf
+        for m in range(first, first + many):
             p = int(pool[m])
-            verdict = _decide(
+            found, near = _decide(
                 arm, S, pairs.row[p], zones[pairs.row[p].zone], path.now, moves, reach, k
             )
-            if verdict == POSSIBLE:
+            if found == POSSIBLE:
                 for i in range(actuators):
-                    box[0, 0, i] = 0.5 * (box[top, 0, i] + box[top, 1, i])
+                    box[0, 0, i] = 0.5 * (here[0, i] + here[1, i])
                 return POSSIBLE
-            if verdict == FREE:
-                continue
             if k.spent[0] >= k.spent[1]:
                 return UNKNOWN
-            pool[end + left] = p
+            if found == FREE:
+                continue
+            pool[used + left] = p
             left += 1
+            nearest = min(nearest, near)
             total = 0.0
             share[:] = 0.0
             for j in range(joints):
@@ -251,13 +264,13 @@ def any_way(
                 widest = int(np.argmax(share))
         if left == 0:
             continue
-        if most < finest or top + 2 > BOXES:
-            return UNKNOWN
-        middle = 0.5 * (box[top, 0, widest] + box[top, 1, widest])
-        box[top + 1] = box[top]
-        box[top + 1, 0, widest] = middle
-        box[top, 1, widest] = middle
+        if most < finest:
+            verdict = UNKNOWN  # so near that it cannot be told; a real contact is still looked for
+            continue
         for side in range(2):
-            span[top + side, 0], span[top + side, 1] = end, left
+            box[top + side] = here
+            box[top + side, 1 - side, widest] = 0.5 * (here[0, widest] + here[1, widest])
+            span[top + side, 0], span[top + side, 1], span[top + side, 2] = used, left, nearest
+        used += left
         top += 2
-    return FREE
+    return verdict

@@ -121,7 +121,7 @@ class SweepConfig:
 
     tolerance_m: float = 0.0002
     clearance_tolerance_m: float = 0.05
-    max_queries: int = 4000
+    max_queries: int = 20000
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,7 @@ from rampe_guard.core.alarm import Level
 from rampe_guard.core.annunciator import Annunciator, Moment
 from rampe_guard.core.config import GuardConfig
 from rampe_guard.core.events import (
+    SYSTEM_ZONE,
     AlertEvent,
     Event,
     Evidence,
@@ -105,6 +106,7 @@ class Guard:
         self._sweeps: tuple[SweepSummary, ...] = ()
         self._swept_s = start_s
         self._poses_came = False
+        self._restarted: str | None = None
 
     @property
     def rampe(self) -> Rampe:
@@ -119,6 +121,9 @@ class Guard:
     def step(self, inputs: Inputs, now_s: float) -> tuple[Event, ...]:
         """Take all that arrived since the last step; returns what is to be published."""
         self._monitor.joystick_alive(inputs.joystick_alive)
+        if inputs.canary is not None:
+            self._monitor.distrust(inputs.canary)
+        self._restarted = inputs.restarted or self._restarted
         for name, reason in inputs.rejected:
             self._refuse(name, reason, now_s)
         events: list[Event] = []
@@ -130,7 +135,7 @@ class Guard:
         self._poses_came |= fresh
         health = self._health(now_s)
         moment = self._moment(health, now_s)
-        events += self._annunciator.system(_system_evidence(health), moment)
+        events += self._annunciator.system(_system_evidence(health, self._restarted), moment)
         if health.status is Status.NOT_MONITORING:
             self._intention.interrupt()
             events += self._annunciator.freeze(moment)
@@ -143,7 +148,10 @@ class Guard:
     def acknowledge(self, alert_id: str, who: str, now_s: float) -> tuple[Event, ...]:
         """Someone has seen an alert; empty if no alert of that id waits for it."""
         moment = self._moment(self._health(now_s), now_s)
-        return tuple(self._annunciator.acknowledge(alert_id, who, moment))
+        events = self._annunciator.acknowledge(alert_id, who, moment)
+        if any(event.zone == SYSTEM_ZONE for event in events):
+            self._restarted = None
+        return tuple(events)
 
     def snapshot(self, now_s: float) -> Snapshot:
         """The present state."""
@@ -278,8 +286,10 @@ def _summary(forecast: Forecast, zone: ZoneSweep) -> SweepSummary:
     return SweepSummary(source, zone, forecast.probability_at(at), forecast.time_at(at))
 
 
-def _system_evidence(health: Health) -> Evidence:
-    if health.status is not Status.NOT_MONITORING or health.starting:
-        return Evidence(Level.CLEAR, "system", None, None, None)
-    note = "; ".join(r.text for r in health.reasons)
-    return Evidence(Level.WARNING, "system", None, None, None, note)
+def _system_evidence(health: Health, restarted: str | None) -> Evidence:
+    """What there is to say of the guard itself; a restart stays until it is acknowledged."""
+    notes = [f"guard restarted after {restarted}"] if restarted else []
+    level = Level.CAUTION if notes else Level.CLEAR
+    if health.status is Status.NOT_MONITORING and not health.starting:
+        level, notes = Level.WARNING, [*(r.text for r in health.reasons), *notes]
+    return Evidence(level, "system", None, None, None, "; ".join(notes))

@@ -104,6 +104,7 @@ GROUP = np.dtype(
         ("bound", "f8"),  # proven lower bound of that, up to the contact
         ("unproven", "f8"),  # first fraction at which the budget was gone, else infinite
         ("now", "f8"),  # distance less margin at the start: a proven bound, or sharp inside
+        ("coarse", "f8"),  # ``bound`` before clearances were sharpened
         ("confirmed", "f8"),  # fraction at which the contact was seen to be one, else NaN
         ("point", "f8", 3),  # of the contact, in the world
         ("hit", "i4", 3),  # pair and nodes of the contact

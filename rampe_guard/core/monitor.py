@@ -2,7 +2,8 @@
 
 ``ok``              both inputs are fresh and plausible
 ``degraded``        monitoring, but something is not as it should be (with reasons)
-``not_monitoring``  an input is missing or too old: nothing that is shown can be trusted
+``not_monitoring``  an input is missing or too old, or the machine computes what is not so:
+                    nothing that is shown can be trusted
 """
 
 from __future__ import annotations
@@ -104,6 +105,7 @@ class InputMonitor:
         self._unknown_s: float | None = None
         self._joystick_alive: bool | None = None
         self._faulty: list[str] = []
+        self._distrust: str | None = None
 
     def accept(self, name: InputName, arrival_s: float) -> None:
         """A good sample arrived."""
@@ -128,6 +130,10 @@ class InputMonitor:
         elif refusal in FAULTS:
             self._faulty.append(refusal)
 
+    def distrust(self, fault: str) -> None:
+        """The machine computed wrongly: nothing it says is to be trusted until it starts anew."""
+        self._distrust = self._distrust or fault
+
     def joystick_alive(self, alive: bool | None) -> None:
         """What the joystick's liveliness token says; None without a token."""
         self._joystick_alive = alive
@@ -146,7 +152,8 @@ class InputMonitor:
 
     def health(self, now_s: float, more: Sequence[Reason] = ()) -> Health:
         """Status at ``now_s``; ``more`` are weaknesses that others have found."""
-        blind = [r for r in (self._silence("actuators", now_s), self._joystick(now_s)) if r]
+        silent = [r for r in (self._silence("actuators", now_s), self._joystick(now_s)) if r]
+        blind = [*self._distrusted(), *silent]
         weak = [*more, *self._weaknesses(now_s)]
         status = Status.NOT_MONITORING if blind else Status.DEGRADED if weak else Status.OK
         ages: dict[InputName, float | None] = {
@@ -160,8 +167,16 @@ class InputMonitor:
             ages,
             dict(self._accepted),
             dict(self._rejected),
-            starting=bool(blind) and not self._accepted and now_s - self._start_s <= limit,
+            starting=bool(silent)
+            and self._distrust is None
+            and not self._accepted
+            and now_s - self._start_s <= limit,
         )
+
+    def _distrusted(self) -> list[Reason]:
+        if self._distrust is None:
+            return []
+        return [Reason("canary_failed", None, f"canary failed: {self._distrust}")]
 
     def _joystick(self, now_s: float) -> Reason | None:
         if self._joystick_alive is False:

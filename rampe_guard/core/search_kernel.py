@@ -176,17 +176,23 @@ def _walk_all(
     found: Records,
     ask: Ask,
     begin: float,
-    touch: float,
+    aim: tuple[float, float],
 ) -> None:
-    """Walk every doubtful pair (of group ``k.only`` if it is not negative) from a fraction on."""
+    """Walk every doubtful pair (of group ``k.only`` if it is not negative) from a fraction on.
+
+    ``aim`` is that of `walk`.
+    """
+    touch, slack = aim
     h = path.end[0] / CELLS
     for i in range(k.doubts):
         d = doubt[i].order
         p = doubt[d].pair
         g = 0 if ask.together == 1 else pairs.row[p].zone
-        if k.only >= 0 and g != k.only:
+        if (k.only >= 0 and g != k.only) or found[g].stop == 0.0:
             continue
-        goal = max(touch, found[g].least - ask.slack)
+        if slack < FAR and math.isnan(found[g].coarse):
+            continue
+        goal = max(touch, found[g].least - slack)
         first, last = -1, -1
         passed = np.inf
         for c in range(CELLS):
@@ -210,7 +216,7 @@ def _walk_all(
         if s0 >= found[g].stop:
             continue
         before = found[g].bound
-        walk(arm, S, pairs, zones, path, k, found, p, g, (s0, s1), (touch, ask.slack))
+        walk(arm, S, pairs, zones, path, k, found, p, g, (s0, s1), aim)
         if found[g].bound < before and found[g].least >= FAR:
             found[g].nearest = p
 
@@ -233,6 +239,8 @@ def _seed(
         p = doubt[d].pair
         z = pairs.row[p].zone
         g = 0 if ask.together == 1 else z
+        if math.isnan(found[g].coarse):
+            continue
         margin = zones[z].margin
         for c in range(0, CELLS + 1, 2):
             low = min(doubt[d].cell[max(c - 1, 0)], doubt[d].cell[min(c, CELLS - 1)])
@@ -379,8 +387,11 @@ def _start(
             limits = ((best if look == 0 else FAR) + margin, 0.0, 0.0)
             away = nearest(arm, S, pairs, path.now, zones[z].pose, p, k, limits)
             if math.isnan(away):
-                found[g].closing = 1
-                found[g].unproven = min(found[g].unproven, 0.0)
+                found[g].closing = 1  # the budget is gone: nothing shows the contrary
+                if touched:
+                    found[g].now = FAR
+                else:
+                    found[g].now = max(min(found[g].now, doubt[d].start), found[g].bound)
                 return
             if look == 0:
                 before = away
@@ -460,25 +471,41 @@ def search(
     lay_path(arm, S, pairs, path)
     _coarse(arm, S, pairs, zones, path, k, doubt, found, ask)
     _contained(arm, S, pairs, zones, path, k, doubt, found, ask)
-    if ask.slack < FAR:
-        _seed(arm, S, pairs, zones, path, k, doubt, found, ask)
     g, rung, begin = 0, 0, 0.0
     k.only = -1
+    slack = 10.0 * FAR
     while True:  # all groups at first; then again each whose contact was refuted
-        touch = ask.touch * LADDER[rung]
-        _walk_all(arm, S, pairs, zones, path, k, doubt, found, ask, begin, touch)
+        aim = (ask.touch * LADDER[rung], slack)
+        _walk_all(arm, S, pairs, zones, path, k, doubt, found, ask, begin, aim)
+        if slack < FAR:
+            break
         while g < groups:
             settled = _refute(arm, S, pairs, zones, path, k, doubt, found, ask, g)
             if not settled and rung + 1 < len(LADDER):
                 break
             g, rung = g + 1, 0
-        if g >= groups:
+        if g >= groups and ask.slack > FAR:
             break
+        if g >= groups:
+            # certificates are settled; with what is left of the budget sharpen clearances
+            k.only, begin, rung, slack = -1, 0.0, len(LADDER) - 1, ask.slack
+            for i in range(groups):
+                found[i].coarse = math.nan
+                if found[i].stop == np.inf and found[i].unproven == np.inf:
+                    found[i].coarse = found[i].bound
+                    found[i].bound = FAR
+            _seed(arm, S, pairs, zones, path, k, doubt, found, ask)
+            continue
         rung += 1
         k.only = g
         begin = found[g].stop
         found[g].stop = np.inf
         found[g].least = FAR
     for g in range(groups):
+        if slack < FAR and not math.isnan(found[g].coarse):
+            if found[g].unproven < np.inf:  # too dear: the proof of before still holds
+                found[g].unproven = np.inf
+                found[g].bound = found[g].coarse
+            found[g].bound = max(found[g].bound, found[g].coarse)
         if ask.sharp == 1 or found[g].bound < FAR or found[g].stop == 0.0:
             _start(arm, S, pairs, zones, path, k, doubt, found, ask, g)

@@ -13,15 +13,17 @@ asked, runs the kernels, and puts their numbers into words.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import numpy as np
 
 from rampe_guard.core.arm_motion import PROBE_MOTION_M, valid_end
 from rampe_guard.core.bounding_tree import NONE
+from rampe_guard.core.scene import ActuatorLimit
 from rampe_guard.core.search_kernel import FAR, Ask, search
 from rampe_guard.core.sweep_box import AnyWay
 from rampe_guard.core.sweep_limit import sweep_limit
+from rampe_guard.core.sweep_problem import Zone
 from rampe_guard.core.types import AnyPath, Certificate, SweepResult, ZoneSweep
 
 if TYPE_CHECKING:
@@ -29,10 +31,11 @@ if TYPE_CHECKING:
 
     from rampe_guard.core.config import SweepConfig
     from rampe_guard.core.kernel_data import Records
-    from rampe_guard.core.scene import ActuatorLimit
-    from rampe_guard.core.sweep_problem import SelfZone, SweepProblem, Zone
+    from rampe_guard.core.sweep_problem import SelfZone, SweepProblem
     from rampe_guard.core.types import FloatArray, Placement
 
+Group: TypeAlias = tuple[Any, ...]
+"""One GROUP record as a tuple."""
 TOUCH_SHARE = 0.1
 """Share of the contact tolerance that counts as contact until a look ahead refutes it."""
 
@@ -42,6 +45,12 @@ class Sweep:
 
     def __init__(self, problem: SweepProblem, config: SweepConfig) -> None:
         self.problem, self.config = problem, config
+        self._every = list(range(len(problem.zones)))
+        self._solid = frozenset(problem.solid)
+        self._group = {index: number for number, index in enumerate(problem.solid)}
+        self._keyed = [
+            i for i, zone in enumerate(problem.zones) if isinstance(zone, Zone) and zone.placed
+        ]
         self._any_way = AnyWay(problem, config, TOUCH_SHARE * config.tolerance_m)
 
     def run(
@@ -84,7 +93,7 @@ class Sweep:
                 f"start has shape {start.shape} and displacement {displacement.shape}; "
                 f"this arm has {shape[0]} actuators"
             )
-        asked = [i for i, zone in enumerate(problem.zones) if only is None or zone.name in only]
+        asked = self._every if only is None else self._named(only)
         end = valid_end(problem.arm, start, displacement)
         if end is None:
             return SweepResult(
@@ -93,22 +102,21 @@ class Sweep:
             )
         zones, lost = self._place(placed or {}, asked)
         found = self._search(zones, start, displacement, end, clearance=clearance, worst=worst)
+        told = found.view(np.ndarray).tolist()
         moving = bool(displacement.any())
-        found = found.view(np.ndarray).tolist()
         entries = []
-        group_of = {index: 0 if worst else number for number, index in enumerate(problem.solid)}
-        told = False
+        if worst:
+            if len(lost) < len(self._solid.intersection(asked)):
+                entries.append(self._worst(told[0], end, moving=moving))
+            asked = [i for i in asked if i not in self._solid or i in lost]
         for index in asked:
             zone = problem.zones[index]
-            if index not in group_of:
-                entries.append(sweep_limit(zone, start, displacement))  # type: ignore[arg-type]
+            if isinstance(zone, ActuatorLimit):
+                entries.append(sweep_limit(zone, start, displacement))
             elif index in lost:
                 entries.append(uncomputed(zone.name))
-            elif not worst:
-                entries.append(self._entry(zone, found[group_of[index]], end, moving=moving))  # type: ignore[arg-type]
-            elif not told:
-                entries.append(self._worst(found[0], end, moving=moving))
-                told = True
+            else:
+                entries.append(self._entry(zone, told[self._group[index]], end, moving=moving))
         result = SweepResult(zones=tuple(entries), queries=int(problem.scratch.spent[0]))
         if not any_path:
             return result
@@ -120,6 +128,9 @@ class Sweep:
             witness=told_at,
             queries=result.queries + int(problem.scratch.spent[0]),
         )
+
+    def _named(self, names: frozenset[str]) -> list[int]:
+        return [i for i, zone in enumerate(self.problem.zones) if zone.name in names]
 
     def _search(
         self,
@@ -165,13 +176,9 @@ class Sweep:
     ) -> tuple[Records, set[int]]:
         """The zones as they are now, and those of which nobody knows where they are."""
         problem = self.problem
-        lost = {
-            i
-            for i in asked
-            if getattr(problem.zones[i], "placed", False)
-            and placed.get(problem.zones[i].name) is None
-        }
-        if not placed and not lost and len(asked) == len(problem.zones):
+        lost = {i for i in self._keyed if placed.get(problem.zones[i].name) is None}
+        lost.intersection_update(asked)
+        if not placed and not lost and asked is self._every:
             return problem.fixed, lost
         zones = problem.fixed.copy()
         wanted = set(asked) - lost
@@ -187,23 +194,23 @@ class Sweep:
         """Actuator limits still have an answer if the numbers are finite; solid zones have none."""
         zone = self.problem.zones[index]
         finite = bool(np.isfinite(start).all() and np.isfinite(displacement).all())
-        if finite and index not in self.problem.solid:
-            return sweep_limit(zone, start, displacement)  # type: ignore[arg-type]
+        if finite and isinstance(zone, ActuatorLimit):
+            return sweep_limit(zone, start, displacement)
         return uncomputed(zone.name)
 
-    def _worst(self, found: Records, end: float, *, moving: bool) -> ZoneSweep:
+    def _worst(self, found: Group, end: float, *, moving: bool) -> ZoneSweep:
         """The entry of all zones together."""
         problem = self.problem
         stop, *_, hit, nearest, _ = found
         pair = int(hit[0]) if stop < np.inf else nearest
         number = problem.pair_zone[pair] if pair != NONE else 0
         zone = problem.zones[problem.solid[number]]
-        return self._entry(zone, found, end, moving=moving)  # type: ignore[arg-type]
+        return self._entry(cast("Zone | SelfZone", zone), found, end, moving=moving)
 
     def _entry(
-        self, zone: Zone | SelfZone, found: Records, end: float, *, moving: bool
+        self, zone: Zone | SelfZone, found: Group, end: float, *, moving: bool
     ) -> ZoneSweep:
-        stop, _, bound, unproven, now, confirmed, point, hit, nearest, closing = found
+        stop, _, bound, unproven, now, _, confirmed, point, hit, nearest, closing = found
         touched = stop < np.inf
         if bound >= FAR and not touched and unproven == np.inf:
             return untouchable(zone.name)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rampe_guard.core.sweep_problem import SweepProblem
     from rampe_guard.core.types import FloatArray, SweepResult
 
-POOL = 1 << 16
+POOL = 1 << 17
 
 
 class AnyWay:
@@ -27,7 +27,7 @@ class AnyWay:
         self._problem, self._config, self._touch_m = problem, config, touch_m
         self._box = np.zeros((BOXES, 2, len(problem.arm.lower)))
         self._pool = np.zeros(POOL + 8 * len(problem.pairs.row))
-        self._span = np.zeros((BOXES, 2))
+        self._span = np.zeros((BOXES, 3))
 
     def answer(
         self, zones: Records, result: SweepResult, start: FloatArray, displacement: FloatArray

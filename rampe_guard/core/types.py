@@ -75,6 +75,8 @@ class Inputs:
     ``rejected`` lists messages that never became a sample, as (input name, reason), and
     ``objects_rejected`` the same of keyed objects, as (object name, reason).
     ``joystick_alive`` is what the joystick's liveliness token says, None without a token.
+    ``canary`` says what this machine computed wrongly when it was tried, and ``restarted`` after
+    what the guard was started anew; both are None where there is nothing to say.
     """
 
     joystick: tuple[JoystickSample, ...] = ()
@@ -83,6 +85,8 @@ class Inputs:
     joystick_alive: bool | None = None
     objects: tuple[ObjectSample, ...] = ()
     objects_rejected: tuple[tuple[str, str], ...] = ()
+    canary: str | None = None
+    restarted: str | None = None
 
 
 class Certificate(StrEnum):
