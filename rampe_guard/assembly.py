@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,14 +40,19 @@ class Machine:
         )
 
 
-def load_machine(site: Site) -> Machine:
+def load_machine(site: Site, progress: Callable[[str, float], None] | None = None) -> Machine:
     """Load meshes and scene of a site.
+
+    Args:
+        site: as `load_site` returns it.
+        progress: told what is done, and which share of it from 0 to 1.
 
     Raises:
         GeometryError: a URDF, mesh, linkage or scene object cannot be used.
     """
     arm = load_arm(site.arm)
-    return Machine(site, arm, FclSweeper(arm, site.scene, site.sweep))
+    sweeper = FclSweeper(arm, site.scene, site.sweep, site.self_collision, progress=progress)
+    return Machine(site, arm, sweeper)
 
 
 class Sweeper:

@@ -1,4 +1,4 @@
-"""Scene objects to zones: bounding trees for the sweep, exact FCL shapes for its confirmation.
+"""Scene objects to zones: bounding trees for the sweep.
 
 Spheres and capsules are a point or a segment with a radius, cylinders and halfspaces nodes of
 their own kind: all of them exact. A closed mesh is solid; one that the scene calls open, like a
@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import fcl
 import numpy as np
 
 from rampe_guard.collision.mesh import ZONE_MOST_M
@@ -138,44 +137,6 @@ def _mesh(
 def about(progress: Progress, what: str) -> Progress:
     """The same, told of which mesh it is."""
     return lambda doing, share: progress(f"{doing} {what}", share)
-
-
-def exact_shape(item: SolidObject) -> fcl.CollisionObject | None:
-    """The same in FCL's own shapes, placed in the world; None where FCL has none to be trusted.
-
-    Halfspaces are not asked of FCL, and meshes are the business of `confirm`.
-    """
-    match item:
-        case Box():
-            return _object(fcl.Box(*item.size_m), item.pose)
-        case Sphere():
-            pose = np.eye(4)
-            pose[:3, 3] = item.center_m
-            return _object(fcl.Sphere(item.radius_m), pose)
-        case Cylinder():
-            return _object(fcl.Cylinder(item.radius_m, item.height_m), item.pose)
-        case Capsule():
-            a, b = np.array(item.start_m), np.array(item.end_m)
-            length = float(np.linalg.norm(b - a))
-            pose = np.eye(4)
-            pose[:3, 3] = 0.5 * (a + b)
-            if length == 0.0:
-                return _object(fcl.Sphere(item.radius_m), pose)
-            pose[:3, :3] = _turned_z((b - a) / length)
-            return _object(fcl.Capsule(item.radius_m, length), pose)
-        case _:
-            return None
-
-
-def _object(shape: fcl.CollisionGeometry, pose: FloatArray) -> fcl.CollisionObject:
-    return fcl.CollisionObject(shape, fcl.Transform(pose[:3, :3], pose[:3, 3]))
-
-
-def _turned_z(way: FloatArray) -> FloatArray:
-    """A rotation that takes z to a unit vector."""
-    side = np.cross(np.eye(3)[np.argmin(np.abs(way))], way)
-    side /= np.linalg.norm(side)
-    return np.column_stack([side, np.cross(way, side), way])
 
 
 def _finite(item: SolidObject, values: Sequence[float]) -> FloatArray:

@@ -122,6 +122,9 @@ class ZoneSweep:
         margin_m: the zone's own margin [m]; None for actuator limits.
         confirmed_fraction: where, at most the tolerance of motion later, the contact was seen
             to be one; None without contact or if it could be refuted no further.
+        confirmed: whether the exact shapes touch there, by another library; None where that is
+            not asked: it needs a contact with the object itself (no margin, no growth), later
+            than the start. A contact that is not confirmed is a contact all the same.
     """
 
     zone: str
@@ -134,6 +137,7 @@ class ZoneSweep:
     closing: bool
     margin_m: float | None = None
     confirmed_fraction: float | None = None
+    confirmed: bool | None = None
 
     @property
     def inside(self) -> bool:
