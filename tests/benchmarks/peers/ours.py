@@ -25,7 +25,7 @@ class Ours:
     def first_contact(self, number: int) -> float | None:
         """An answer of unknown counts as contact, as it does in the guard."""
         motion = self._motions[number]
-        result = self.sweeper.sweep(motion.start, motion.displacement, clearance=False)
+        result = self.sweeper.sweep(motion.start, motion.displacement, clearance=False, worst=True)
         fraction = result.contact_fraction
         if fraction is None and result.certificate is not Certificate.FREE:
             return 0.0

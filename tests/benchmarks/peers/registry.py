@@ -16,7 +16,7 @@ HERE = "tests.benchmarks.peers"
 OURS = "rampe-guard"
 PROOF = "proof"
 DISTANCE = "if its distance is right"
-HULLS = "same, of hulls"
+HULLS = "of hulls, if its distance is right"
 SAMPLES = "none below 2.5 mm depth"
 NONE = "none"
 

@@ -70,11 +70,12 @@ def draw_motions(
 
 
 def _ground(machine: Machine) -> Item:
-    """A slab under everything, a little below the base."""
+    """A slab under everything, so far below the base that starts can be clear of it."""
+    below = max(0.01 * machine.reach_m, 4.0 * machine.tolerance_m)
     size = 8.0 * machine.reach_m
     thick = 0.2 * machine.reach_m
     pose = np.eye(4)
-    pose[2, 3] = machine.floor_m - 0.01 * machine.reach_m - 0.5 * thick
+    pose[2, 3] = machine.floor_m - below - 0.5 * thick
     return box_item("ground", 0, np.array([size, size, thick]), pose)
 
 
