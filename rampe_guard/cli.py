@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import faulthandler
 import json
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from rampe_guard import __version__
 from rampe_guard.errors import RampeGuardError
@@ -15,6 +16,8 @@ from rampe_guard.errors import RampeGuardError
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; returns its exit code (0, or 2 for an error that a user can mend)."""
     args = _parser().parse_args(argv)
+    # how to start this very command again; the interpreter knows it, unless we were called
+    args.again = sys.orig_argv[1:] if argv is None else ["-m", "rampe_guard", *argv]
     try:
         code: int = args.command(args)
     except RampeGuardError as error:
@@ -47,14 +50,25 @@ def _demo(args: argparse.Namespace) -> int:
 
 
 def _run(args: argparse.Namespace) -> int:
+    from rampe_guard.runtime.supervisor import Supervisor, end_with_parent
+
+    if args.supervisor:
+        return Supervisor([sys.executable, *args.again, "--no-supervisor"]).run()
     from rampe_guard.runtime.stopping import StopFlag
 
     stop = StopFlag.on_signals()  # before the imports, which take a while
-    from rampe_guard.runtime.daemon import run
-    from rampe_guard.runtime.say import configure
+    end_with_parent()
+    faulthandler.enable()  # where a crash in native code came from
 
-    configure()
-    return run(args.site, args.connect, stop, args.operator)
+    def imported() -> Callable[[], int]:
+        from rampe_guard.runtime.daemon import run
+        from rampe_guard.runtime.say import configure
+
+        configure()
+        return lambda: run(args.site, args.connect, stop, args.operator)
+
+    guard = stop.unless_stopped(imported)
+    return 0 if guard is None else guard()
 
 
 def _check(args: argparse.Namespace) -> int:
@@ -161,6 +175,12 @@ def _parser() -> argparse.ArgumentParser:
     run = commands.add_parser("run", help="the daemon")
     _site(run, connect=True)
     _operator(run)
+    run.add_argument(
+        "--no-supervisor",
+        dest="supervisor",
+        action="store_false",
+        help="one process: do not watch over it, nor start it anew after a crash",
+    )
     run.set_defaults(command=_run)
 
     check = commands.add_parser("check", help="validate site, scene, meshes and kinematics")

@@ -1,18 +1,26 @@
-"""``rampe-guard run``: load, connect (for as long as it takes), work, end cleanly."""
+"""``rampe-guard run``: load, connect (for as long as it takes), work, end cleanly.
+
+Before anything is guarded the canary is tried once, which also compiles or loads the kernels of
+the sweep. A guard whose canary fails tells so for a while and ends with `UNTRUSTED`: a machine
+that computes wrongly is not to be trusted again until its process has started anew.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rampe_guard.assembly import load_machine
+from rampe_guard.assembly import Machine, load_machine
+from rampe_guard.collision.canary import Canary
 from rampe_guard.errors import ConnectionFailedError, SettingsError
+from rampe_guard.runtime.canary_watch import CanaryWatch
 from rampe_guard.runtime.connecting import connect_to
 from rampe_guard.runtime.say import Sayer
 from rampe_guard.runtime.stopping import StopFlag
 from rampe_guard.runtime.store_keeper import Keeper
+from rampe_guard.runtime.supervisor import UNTRUSTED, restarted_after
 from rampe_guard.runtime.worker import Worker
 from rampe_guard.runtime.zenoh_io import Bus
-from rampe_guard.settings import for_operator, load_site
+from rampe_guard.settings import Site, for_operator, load_site
 
 
 def run(
@@ -26,6 +34,9 @@ def run(
         stop: ends it.
         operator: who is at the levers, instead of whom the site file names.
 
+    Returns:
+        The exit code: 0, or `UNTRUSTED` if the canary failed.
+
     Raises:
         SettingsError: the site file is wrong.
         GeometryError: its geometry cannot be used.
@@ -36,9 +47,11 @@ def run(
         raise SettingsError(
             f"{site.path}: format: {site.format!r} is not supported by this version; use json"
         )
-    machine = stop.unless_stopped(lambda: load_machine(site))
-    if machine is None:
+    say.info("loading; the first time on a machine the sweep is compiled: a minute or two")
+    loaded = stop.unless_stopped(lambda: _load(site))
+    if loaded is None:
         return 0
+    machine, canary = loaded
     say.info(f"{site.machine} at {site.name}: {len(machine.sweeper.zones)} zones loaded")
     bus = Bus.open_retrying(site.zenoh, stop, lambda text: say.warn("connect", text), stop.wait)
     if bus is None:
@@ -50,8 +63,16 @@ def run(
                 " machine a base key of its own"
             )
         with Keeper(site, machine.arm.limits, say) as keeper:
-            worker = Worker(machine, bus, say, keeper)
+            worker = Worker(machine, bus, say, keeper, CanaryWatch(canary), restarted_after())
             say.info(f"guarding on {site.keys.base}")
-            worker.run(stop, stop.wait)
-    say.info("stopped")
-    return 0
+            untrusted = worker.run(stop, stop.wait)
+    say.info("ended: the canary failed" if untrusted else "stopped")
+    return UNTRUSTED if untrusted else 0
+
+
+def _load(site: Site) -> tuple[Machine, Canary]:
+    """Machine and canary, tried once: the worker tries it again before its first step."""
+    machine = load_machine(site)
+    canary = Canary(machine.arm, site.sweep)
+    canary.check()
+    return machine, canary

@@ -119,6 +119,7 @@ class Pulse:
         overruns: int,
         primitives: dict[str, int],
         extra: Iterable[wire.Reason] = (),
+        canary: wire.CanaryTrial | None = None,
     ) -> wire.Heartbeat:
         """A heartbeat; ``extra`` are reasons that only the daemon knows (no router, say)."""
         self._seq += 1
@@ -148,6 +149,7 @@ class Pulse:
             accepted=accepted,
             rejected=rejected,
             objects=self._objects(health.objects, now_s),
+            canary=canary,
             primitives=primitives,
             drops=overruns,
             loop_ms=self.loop_ms.quantiles(),

@@ -3,7 +3,8 @@
 It wakes every few milliseconds. When something arrived (or nothing did for a while), it
 takes everything that waits through `Guard.step`, which sweeps once, from the newest state;
 so however fast inputs come, nothing queues up. The heartbeat comes from this loop and from
-nowhere else: if the loop is stuck, the heartbeat stops.
+nowhere else: if the loop is stuck, the heartbeat stops. Every two seconds it tries the canary;
+if that fails, the loop says so for a while, and ends.
 """
 
 from __future__ import annotations
@@ -12,12 +13,14 @@ import gc
 import os
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 from rampe_guard import wire
 from rampe_guard.assembly import Machine
 from rampe_guard.core.events import AlertEvent, Event, PredictionEvent
 from rampe_guard.core.types import Inputs
 from rampe_guard.errors import MessageError
+from rampe_guard.runtime.canary_watch import CanaryWatch
 from rampe_guard.runtime.health import Pulse, TimedSweeper
 from rampe_guard.runtime.intake import Intake
 from rampe_guard.runtime.messages import Scribe
@@ -44,9 +47,19 @@ class Worker:
         bus: an open session.
         say: log.
         keeper: remembers what earlier runs learned, and keeps what this one learns.
+        canary: is asked again and again whether this machine computes what is so.
+        restarted: after what the guard was started anew, if it was.
     """
 
-    def __init__(self, machine: Machine, bus: Bus, say: Sayer, keeper: Keeper) -> None:
+    def __init__(
+        self,
+        machine: Machine,
+        bus: Bus,
+        say: Sayer,
+        keeper: Keeper,
+        canary: CanaryWatch,
+        restarted: str | None = None,
+    ) -> None:
         site = machine.site
         base = site.keys.base
         self._bus, self._say = bus, say
@@ -56,7 +69,7 @@ class Worker:
         self._pulse = Pulse(site, boot, start_s, _unix_s, site.scene.content_hash)
         timed = TimedSweeper(machine.sweeper, self._pulse.sweep_ms)
         self._guard = machine.guard(start_s, boot, timed)
-        self._keeper = keeper
+        self._keeper, self._canary, self._restarted = keeper, canary, restarted
         keeper.begin(self._guard.rampe, start_s)
         self._intake = Intake(bus, site, say)
         self._alerts = bus.outbox(f"{base}/alert", "rampe.alert.v1", urgent=True)
@@ -70,14 +83,17 @@ class Worker:
         self._connected = True
         self._heartbeat: wire.Heartbeat | None = None
 
-    def run(self, stopped: Callable[[], bool], wait: Callable[[float], object]) -> None:
-        """Work until ``stopped``; ``wait`` sleeps but returns early when stopping."""
+    def run(self, stopped: Callable[[], bool], wait: Callable[[float], object]) -> bool:
+        """Work until ``stopped``; ``wait`` sleeps but returns early when stopping.
+
+        Returns:
+            Whether it ended by itself, because the canary failed.
+        """
         gc.collect()
         gc.freeze()  # meshes and models are for life: do not walk them at every collection
         last_step_s = last_beat_s = float("-inf")
-        while not stopped():
-            now_s = time.monotonic()
-            inputs = self._intake.collect(now_s)
+        while not stopped() and not self._canary.told(now_s := time.monotonic()):
+            inputs = self._with_trial(self._intake.collect(now_s), now_s)
             if arrived(inputs) or now_s - last_step_s >= IDLE_STEP_S:
                 last_step_s = now_s
                 self._step(inputs, now_s)
@@ -87,6 +103,15 @@ class Worker:
             self._answer(now_s)
             self._keeper.keep(now_s)
             wait(_WAKE_S)
+        return not stopped()
+
+    def _with_trial(self, inputs: Inputs, now_s: float) -> Inputs:
+        """The inputs with what this machine has to say of itself, if anything."""
+        fault, restarted = self._canary.look(now_s), self._restarted
+        if fault is None and restarted is None:
+            return inputs
+        self._restarted = None
+        return replace(inputs, canary=fault, restarted=restarted)
 
     def _step(self, inputs: Inputs, now_s: float) -> None:
         began = time.perf_counter()
@@ -118,7 +143,12 @@ class Worker:
             extra.append(wire.Reason(code="no_router", text="no Zenoh router", key=None))
         health = self._guard.snapshot(now_s).health
         self._heartbeat = self._pulse.beat(
-            health, now_s, self._intake.overruns, self._guard.lessons, extra
+            health,
+            now_s,
+            self._intake.overruns,
+            self._guard.lessons,
+            extra,
+            self._canary.trial(now_s),
         )
         self._beats.put(wire.encode(self._heartbeat))
         if connected is not self._connected:
@@ -158,9 +188,10 @@ class Worker:
 
 
 def arrived(inputs: Inputs) -> bool:
-    """Anything at all came, good or refused."""
+    """Anything at all came, good or refused, from outside or of this machine itself."""
     lists = (inputs.joystick, inputs.actuators, inputs.rejected)
-    return any((*lists, inputs.objects, inputs.objects_rejected))
+    news = (inputs.canary, inputs.restarted)
+    return any((*lists, inputs.objects, inputs.objects_rejected, *news))
 
 
 def _unix_s(now_s: float) -> float:

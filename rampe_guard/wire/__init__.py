@@ -8,7 +8,15 @@ site's units.
 from rampe_guard.wire.ack import Ack
 from rampe_guard.wire.alert import Alert
 from rampe_guard.wire.codec import MAX_PAYLOAD_BYTES, decode, encode
-from rampe_guard.wire.health import Heartbeat, InputAges, InputRates, ObjectInput, Quantiles, Reason
+from rampe_guard.wire.health import (
+    CanaryTrial,
+    Heartbeat,
+    InputAges,
+    InputRates,
+    ObjectInput,
+    Quantiles,
+    Reason,
+)
 from rampe_guard.wire.inputs import (
     ActuatorsMessage,
     JoystickMessage,
@@ -29,6 +37,7 @@ __all__ = [
     "Ack",
     "ActuatorsMessage",
     "Alert",
+    "CanaryTrial",
     "Endpoint",
     "Heartbeat",
     "InputAges",

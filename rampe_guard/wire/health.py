@@ -65,6 +65,16 @@ class ObjectInput(Message, frozen=True, kw_only=True):
     ]
 
 
+class CanaryTrial(Message, frozen=True, kw_only=True):
+    """The newest trial of the sweep and of FCL with motions whose answers are known."""
+
+    result: Annotated[
+        Literal["ok", "failed"],
+        Meta(description="failed: this machine computes what is not so, and is not monitoring."),
+    ]
+    age_s: Annotated[float, Meta(description="Age of the newest trial [s].")]
+
+
 class Heartbeat(Message, frozen=True, kw_only=True):
     """Health of the guard, sent from its worker loop."""
 
@@ -94,6 +104,9 @@ class Heartbeat(Message, frozen=True, kw_only=True):
     objects: Annotated[
         tuple[ObjectInput, ...], Meta(description="Objects that move, in the order of the scene.")
     ] = ()
+    canary: Annotated[
+        CanaryTrial | None, Meta(description="Does the machine compute what is so? null untried.")
+    ] = None
     primitives: Annotated[
         dict[str, int],
         Meta(description="Finished primitives since the boot: learned, or by why they were not."),

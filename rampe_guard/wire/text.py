@@ -29,6 +29,8 @@ def alert_text(
     if source == "system":
         if level == "clear":
             return "monitoring again"
+        if level == "caution":  # it monitors, but something was amiss
+            return _cut(zone, MAX_TEXT)
         head = "NOT MONITORING: "
         return head + _cut(zone, MAX_TEXT - len(head))
     if level == "clear":

@@ -169,9 +169,10 @@ def measure(motion: str, rate_hz: float, seconds: float) -> Result:
         send(endpoint, site, arm, rate_hz, 1.0)
         time.sleep(site.guard.inputs.actuators_timeout_s + 0.5)  # a new start of the sine
         before = ears.wait("heartbeat", lambda _: True, 5.0, time.monotonic()).body
-        used_s, began_s = cpu_s(guard.pid), time.monotonic()
+        worker = processes.guarding(guard)
+        used_s, began_s = cpu_s(worker), time.monotonic()
         put_s, late_ms = send(endpoint, site, arm, rate_hz, seconds)
-        share = (cpu_s(guard.pid) - used_s) / (time.monotonic() - began_s)
+        share = (cpu_s(worker) - used_s) / (time.monotonic() - began_s)
         time.sleep(0.5)
         last = ears.wait("heartbeat", lambda _: True, 5.0, time.monotonic()).body
         alerts = ears.since(began_s, "alert")

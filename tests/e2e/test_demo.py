@@ -14,8 +14,8 @@ from tests.support.processes import Identity, Process, living, until, watched_fa
 pytestmark = pytest.mark.e2e
 
 END_S = 5.0
-PARTS = 4
-"""The demo itself, router, guard and operator."""
+PARTS = 5
+"""The demo itself, router, guard and its supervisor, operator."""
 
 
 def wait_to_end(demo: Process, note: Callable[[], set[Identity]], within_s: float) -> None:

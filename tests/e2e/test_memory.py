@@ -142,10 +142,9 @@ def test_what_was_learned_outlives_the_guard_and_goes_when_told(workplace: Workp
         assert str(workplace.model()) in shown.stdout.replace("\n", "").replace(" ", "")
         held = command("model", "reset", site, state=workplace.state)
         assert held.returncode == 2
-        assert f"is held by a running guard, process {guard.pid}" in held.stderr
+        assert f"is held by a running guard, process {processes.guarding(guard)}" in held.stderr
         assert workplace.model().exists()
-        guard.popen.kill()  # it cannot save now, nor give the lock back
-        guard.popen.wait()
+        processes.kill_guard(guard)  # it cannot save now, nor give the lock back
 
     with workplace.guard("--operator", "Anna") as guard:
         assert "operator 'Anna': nothing learned yet" in guard.err
@@ -174,8 +173,7 @@ def test_a_guard_that_is_killed_loses_only_what_was_not_saved(workplace: Workpla
     with workplace.guard() as guard:
         workplace.swing(1)
         workplace.saved(2)
-        os.kill(guard.pid, signal.SIGKILL)
-        guard.popen.wait()
+        processes.kill_guard(guard)
     with workplace.guard() as guard:
         assert "2 primitives of 2 categories known" in guard.err
 

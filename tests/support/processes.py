@@ -22,8 +22,9 @@ T = TypeVar("T")
 ROOT = Path(__file__).resolve().parents[2]
 BENCH = ROOT / "config" / "sites" / "bench.yaml"
 DEMO = ROOT / "config" / "sites" / "demo.yaml"
-START_S = 40.0
-"""Two slow cores, meshes to load: far above what a start takes, so only a hang reaches it."""
+START_S = 240.0
+"""Two slow cores, meshes to load, and the first time the sweep is compiled: only a hang takes so
+long."""
 
 
 def free_endpoint() -> str:
@@ -147,6 +148,22 @@ def guard(folder: Path, site: Path, endpoint: str, *more: str) -> Process:
     return process
 
 
+def guarding(process: Process) -> int:
+    """Pid of the process that guards, below the supervisor that ``run`` is."""
+
+    (pid,) = until(lambda: children(process), 5.0, f"a guard below pid {process.pid}")
+    return pid
+
+
+def kill_guard(process: Process) -> None:
+    """Supervisor and guard die at once, and neither can do anything about it."""
+    worker = guarding(process)
+    os.kill(process.pid, signal.SIGSTOP)  # it must not start another
+    os.kill(worker, signal.SIGKILL)
+    process.popen.kill()
+    process.popen.wait()
+
+
 @functools.cache
 def _nowhere() -> Path:
     """A folder for commands that keep nothing."""
@@ -184,6 +201,16 @@ def descendants(pid: int) -> set[Identity]:
         if not more:
             return {(member, parents[member][1]) for member in family}
         family |= more
+
+
+def children(process: Process) -> set[int]:
+    """Pids of all processes below one."""
+    return {pid for pid, _ in descendants(process.pid)} - {process.pid}
+
+
+def living_pid(pid: int) -> bool:
+    """Whether there is such a process that is no zombie."""
+    return _stat(Path(f"/proc/{pid}")) is not None
 
 
 def living(family: set[Identity]) -> set[int]:

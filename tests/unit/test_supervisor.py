@@ -1,0 +1,170 @@
+"""The supervisor with tiny guards: what is started anew, what is not, and who ends with whom."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.support.processes import Process, children, living_pid, until
+
+SUPERVISE = """
+import signal, sys
+from rampe_guard.runtime.supervisor import Supervisor
+command = [sys.executable, "-c", sys.argv[1], *sys.argv[2:]]
+sys.exit(Supervisor(command, first_delay_s=0.05, longest_delay_s=0.15).run())
+"""
+COUNT = """
+import os, pathlib, signal, sys, time
+from rampe_guard.runtime.supervisor import end_with_parent, restarted_after
+folder = pathlib.Path(sys.argv[1])
+life = len(list(folder.glob("life-*")))
+(folder / f"life-{life}").write_text(f"{os.getpid()} {restarted_after()}")
+"""
+LIVE = """
+signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+end_with_parent()
+(folder / "ready").touch()
+while True:
+    time.sleep(0.01)
+"""
+
+
+def supervise(folder: Path, guard: str) -> Process:
+    return Process(folder, "supervisor", ["-c", SUPERVISE, COUNT + guard, folder])
+
+
+def lives(folder: Path) -> list[str]:
+    """After what each guard was started, in order."""
+    count = len(list(folder.glob("life-*")))
+    return [(folder / f"life-{k}").read_text().partition(" ")[2] for k in range(count)]
+
+
+def ready(folder: Path) -> None:
+    until((folder / "ready").exists, 20.0, "a guard that is ready")
+
+
+@pytest.mark.parametrize("code", [0, 2, 130])
+def test_what_ends_on_purpose_ends_both(tmp_path: Path, code: int) -> None:
+    with supervise(tmp_path, f"sys.exit({code})") as parent:
+        assert parent.popen.wait(20.0) == code
+        assert parent.err == ""
+    assert lives(tmp_path) == ["None"]
+
+
+def test_what_dies_is_started_anew_and_told_why(tmp_path: Path) -> None:
+    guard = """
+if life == 0: os.kill(os.getpid(), signal.SIGSEGV)
+if life == 1: sys.exit(3)
+if life == 2: sys.exit(1)
+if life == 3: os.kill(os.getpid(), signal.SIGRTMIN + 3)
+sys.exit(2)
+"""
+    with supervise(tmp_path, guard) as parent:
+        assert parent.popen.wait(20.0) == 2
+        lines = parent.err.splitlines()
+    number = signal.SIGRTMIN + 3
+    assert lives(tmp_path) == [
+        "None",
+        "a crash (SIGSEGV)",
+        "a failed canary",
+        "a fault (exit code 1)",
+        f"a crash (signal {number})",
+    ]
+    # twice the wait after each short life, up to the longest
+    assert lines == [
+        "rampe-guard: the guard died of SIGSEGV; it is started anew in 0.05 s",
+        "rampe-guard: the guard ended with exit code 3; it is started anew in 0.1 s",
+        "rampe-guard: the guard ended with exit code 1; it is started anew in 0.15 s",
+        f"rampe-guard: the guard died of signal {number}; it is started anew in 0.15 s",
+    ]
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_signals_are_passed_on_and_the_end_is_waited_for(
+    tmp_path: Path, number: signal.Signals
+) -> None:
+    with supervise(tmp_path, LIVE) as parent:
+        ready(tmp_path)
+        (child,) = children(parent)
+        parent.signal_and_wait(number)
+        assert parent.popen.returncode == 0
+        assert not living_pid(child)
+    assert lives(tmp_path) == ["None"]
+
+
+def test_a_guard_that_dies_of_what_was_passed_on_has_ended_well(tmp_path: Path) -> None:
+    with supervise(tmp_path, '(folder / "ready").touch(); time.sleep(60)') as parent:
+        ready(tmp_path)
+        parent.signal_and_wait(signal.SIGTERM)
+        assert (parent.popen.returncode, parent.err) == (0, "")
+
+
+def test_a_guard_that_crashes_on_its_way_out_is_told_by_the_code(tmp_path: Path) -> None:
+    guard = """
+signal.signal(signal.SIGTERM, lambda *_: os.kill(os.getpid(), signal.SIGSEGV))
+(folder / "ready").touch()
+time.sleep(60)
+"""
+    with supervise(tmp_path, guard) as parent:
+        ready(tmp_path)
+        parent.signal_and_wait(signal.SIGTERM)
+        assert parent.popen.returncode == 128 + signal.SIGSEGV
+    assert lives(tmp_path) == ["None"]
+
+
+def test_a_signal_while_it_waits_ends_it(tmp_path: Path) -> None:
+    program = SUPERVISE.replace("0.05", "60")
+    args = ["-c", program, COUNT + "os.kill(os.getpid(), signal.SIGSEGV)", str(tmp_path)]
+    with Process(tmp_path, "supervisor", args) as parent:
+        parent.wait_for("started anew in 60 s")
+        assert parent.signal_and_wait(signal.SIGTERM) < 20.0
+        assert parent.popen.returncode == 0
+    assert len(lives(tmp_path)) == 1
+
+
+@pytest.mark.parametrize("kernel", [True, False], ids=["prctl", "pipe"])
+def test_a_guard_ends_when_its_supervisor_is_killed(tmp_path: Path, *, kernel: bool) -> None:
+    blind = "" if kernel else "import ctypes; ctypes.CDLL = lambda _: None\n"
+    only = "" if not kernel else "import rampe_guard.runtime.supervisor as s; s._outlive = id\n"
+    with supervise(tmp_path, blind + only + LIVE) as parent:
+        ready(tmp_path)
+        (child,) = children(parent)
+        parent.popen.kill()
+        until(lambda: not living_pid(child), 20.0, f"the end of the guard, process {child}")
+
+
+def test_a_hang_up_that_was_switched_off_stays_so(tmp_path: Path) -> None:
+    program = f"import signal\nsignal.signal(signal.SIGHUP, signal.SIG_IGN)\n{SUPERVISE}"
+    with Process(tmp_path, "supervisor", ["-c", program, COUNT + LIVE, tmp_path]) as parent:
+        ready(tmp_path)
+        (child,) = children(parent)
+        os.kill(parent.pid, signal.SIGHUP)
+        time.sleep(0.5)  # either would have ended at once
+        assert parent.alive
+        assert living_pid(child)
+        parent.signal_and_wait(signal.SIGTERM)
+        assert parent.popen.returncode == 0
+
+
+def test_the_kernels_folder_is_chosen_anew_unless_a_user_chose_it(tmp_path: Path) -> None:
+    show = "print(os.environ.get('NUMBA_CACHE_DIR'))"
+    for set_to, seen in (("/x/kernels-0123", "None"), ("/x/mine", "/x/mine")):
+        program = f"import os; os.environ['NUMBA_CACHE_DIR'] = {set_to!r}\n{SUPERVISE}"
+        args = ["-c", program, "import os\n" + show]
+        with Process(tmp_path, "supervisor", args) as parent:
+            assert parent.popen.wait(20.0) == 0
+            assert parent.out.strip() == seen
+
+
+def test_it_loads_nothing_that_may_crash(tmp_path: Path) -> None:
+    program = (
+        "import sys, rampe_guard.cli, rampe_guard.runtime.supervisor\n"
+        "print({'numpy', 'numba', 'fcl', 'zenoh', 'msgspec', 'pydantic'} & set(sys.modules))"
+    )
+    with Process(tmp_path, "imports", ["-c", program]) as done:
+        assert done.popen.wait(20.0) == 0
+        assert done.out.strip() == "set()"
