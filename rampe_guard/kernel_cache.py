@@ -11,6 +11,8 @@ import hashlib
 import os
 from pathlib import Path
 
+COMPILED = "search_kernel.search-*.nbi"
+"""What numba keeps of the outermost kernel."""
 KERNELS = ("*_kernel.py", "gjk.py", "kernel_data.py", "compiled.py")
 
 
@@ -28,10 +30,18 @@ def choose_folder() -> None:
             digest.update(file.read_bytes())
     chosen = os.environ.get("RAMPE_GUARD_CACHE")
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    folder = (Path(chosen) if chosen else home / "rampe-guard") / f"kernels-{digest.hexdigest()[:16]}"
+    base = Path(chosen) if chosen else home / "rampe-guard"
+    folder = base / f"kernels-{digest.hexdigest()[:16]}"
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:
         return
     if os.access(folder, os.W_OK):
         os.environ["NUMBA_CACHE_DIR"] = str(folder)
+
+
+def kept() -> bool:
+    """Whether there are compiled kernels; else the first sweep takes a minute."""
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    folder = Path(chosen) if chosen else Path(__file__).parent / "core" / "__pycache__"
+    return any(folder.rglob(COMPILED))

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import logging
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from rampe_guard.assembly import Machine, load_machine
+from rampe_guard.assembly import Machine
 from rampe_guard.core.scene import ActuatorLimit, SceneObject
-from rampe_guard.core.types import FloatArray
+from rampe_guard.core.types import FloatArray, ZoneSweep
+from rampe_guard.runtime.loading import load_telling
 from rampe_guard.runtime.store import model_path
 from rampe_guard.runtime.zenoh_io import check_configuration
 from rampe_guard.settings import Site, load_site
@@ -23,17 +29,36 @@ def checkup(site_path: str, console: Console) -> int:
     """
     site = load_site(site_path)
     check_configuration(site.zenoh)
-    machine = load_machine(site)
+    with _warnings_heard() as heard:
+        machine = load_telling(site, lambda text: _tell(console, text), sys.stderr)
     pose = resting_pose(machine.arm.limits)
     console.print(Text(f"{site.machine} at {site.name}", "bold"), Text(f"  {site.path}", "dim"))
     for table in (_keys(site), _actuators(machine), _links(machine), _zones(machine, pose)):
         console.print()
         console.print(table)
     console.print()
-    for remark in _remarks(machine):
+    for remark in (*_remarks(machine), *heard):
         console.print(Text(f"note: {remark}", "yellow"))
     console.print(Text("ok: this site can be guarded", "bold"))
     return 0
+
+
+def _tell(console: Console, text: str) -> None:
+    console.print(Text(text, "dim"))
+
+
+@contextmanager
+def _warnings_heard() -> Iterator[list[str]]:
+    """What is logged as a warning meanwhile, such as a cache that cannot be written."""
+    words: list[str] = []
+    handler = logging.Handler(logging.WARNING)
+    handler.emit = lambda record: words.append(record.getMessage())  # type: ignore[method-assign]
+    log = logging.getLogger("rampe_guard")
+    log.addHandler(handler)
+    try:
+        yield words
+    finally:
+        log.removeHandler(handler)
 
 
 def resting_pose(limits: FloatArray) -> FloatArray:
@@ -95,16 +120,23 @@ def _zones(machine: Machine, pose: FloatArray) -> Table:
     )
     swept = {z.zone: z for z in machine.sweeper.sweep(pose, np.zeros_like(pose)).zones}
     for zone in machine.site.scene.objects:
-        found = swept[zone.name]
-        near = found.clearance_now_m
-        where = "unknown" if near is None else f"{near:.2f} {_unit(machine, zone)} clear"
-        if found.inside:
-            where = f"the arm is inside ({found.link or 'actuator'})"
+        where = _where(swept[zone.name], _unit(machine, zone))
         if not isinstance(zone, ActuatorLimit) and zone.key is not None:
             where = f"moves: unknown without a pose newer than {zone.timeout_s:g} s"
         margin = "" if isinstance(zone, ActuatorLimit) else f"{zone.margin_m:g} m"
         table.add_row(zone.name, type(zone).__name__, margin, where)
+    margin_m = machine.site.self_collision.margin_m
+    for name in machine.sweeper.zones[len(machine.site.scene.objects) :]:
+        table.add_row(name, "the arm itself", f"{margin_m:g} m", _where(swept[name], "m"))
     return table
+
+
+def _where(found: ZoneSweep, unit: str) -> str:
+    """How far the arm is from a zone, in words."""
+    if found.inside:
+        return f"the arm is inside ({found.link or 'actuator'})"
+    near = found.clearance_now_m
+    return "unknown" if near is None else f"{near:.2f} {unit} clear"
 
 
 def _unit(machine: Machine, zone: SceneObject) -> str:
@@ -118,6 +150,10 @@ def _remarks(machine: Machine) -> list[str]:
         f"joint {name!r} is driven by no actuator and held at {value:g}"
         for name, value in machine.arm.fixed_joints.items()
     ]
+    remarks += machine.sweeper.notes
+    always = [f"{a} and {b}" for a, b in machine.sweeper.always_touching]
+    if always:
+        remarks.append(f"links that always touch are not swept: {', '.join(always)}")
     bare = [
         name
         for name, mesh in zip(machine.arm.link_names, machine.arm.meshes, strict=True)
