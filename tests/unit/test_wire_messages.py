@@ -14,6 +14,7 @@ from rampe_guard.core.types import Certificate
 from rampe_guard.errors import MessageError
 from rampe_guard.wire import (
     Alert,
+    CanaryTrial,
     Heartbeat,
     InputAges,
     InputRates,
@@ -130,6 +131,7 @@ HEARTBEAT = Heartbeat(
             rejected={"bad_rotation": 1},
         ),
     ),
+    canary=CanaryTrial(result="ok", age_s=1.5),
     primitives={"learned": 3, "outlier": 1},
     drops=None,
     loop_ms=Quantiles(p50=1.0, p99=3.0),

@@ -22,6 +22,7 @@ from rampe_guard.wire import MAX_TEXT, alert_text
         (("bucket", "cab-wall", None, "clear"), "cab-wall clear"),
         ((None, "joystick silent", None, "warning", "system"), "NOT MONITORING: joystick silent"),
         ((None, "joystick silent", None, "clear", "system"), "monitoring again"),
+        ((None, "guard restarted", None, "caution", "system"), "guard restarted"),
         (("a\nb", "c", 1.0), "a?b → c in 1.0 s"),
     ],
 )
