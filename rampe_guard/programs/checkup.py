@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -30,7 +29,7 @@ def checkup(site_path: str, console: Console) -> int:
     site = load_site(site_path)
     check_configuration(site.zenoh)
     with _warnings_heard() as heard:
-        machine = load_telling(site, lambda text: _tell(console, text), sys.stderr)
+        machine = load_telling(site)
     pose = resting_pose(machine.arm.limits)
     console.print(Text(f"{site.machine} at {site.name}", "bold"), Text(f"  {site.path}", "dim"))
     for table in (_keys(site), _actuators(machine), _links(machine), _zones(machine, pose)):
@@ -41,10 +40,6 @@ def checkup(site_path: str, console: Console) -> int:
         console.print(Text(f"note: {remark}", "yellow"))
     console.print(Text("ok: this site can be guarded", "bold"))
     return 0
-
-
-def _tell(console: Console, text: str) -> None:
-    console.print(Text(text, "dim"))
 
 
 @contextmanager

@@ -20,13 +20,13 @@ import numpy as np
 from rich.console import Console
 
 from rampe_guard import wire
-from rampe_guard.assembly import load_machine
 from rampe_guard.core.alarm import Level
 from rampe_guard.errors import ConnectionFailedError
 from rampe_guard.evaluate.tally import Tally
 from rampe_guard.programs.scoring import closing_table
 from rampe_guard.resources import shipped_site
 from rampe_guard.runtime.connecting import connect_to
+from rampe_guard.runtime.loading import load_telling
 from rampe_guard.runtime.say import Sayer
 from rampe_guard.runtime.stopping import StopFlag
 from rampe_guard.runtime.zenoh_io import Bus
@@ -62,7 +62,7 @@ def demo(cycles: int, seed: int, console: Console, stop: StopFlag) -> int:
         work = ["-m", "rampe_guard.simulate.process", "--connect", endpoint]
         operator = start("operator", [*work, "--cycles", str(cycles), "--seed", str(seed)])
         console.print("router, guard and operator are starting; the quarry is being loaded …")
-        machine = stop.unless_stopped(lambda: load_machine(site))
+        machine = stop.unless_stopped(lambda: load_telling(site, console.print))
         if machine is None:
             return 0
         bus = Bus.open_retrying(site.zenoh, stop, Sayer("rampe_guard.demo").info, stop.wait)

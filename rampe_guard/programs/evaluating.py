@@ -12,7 +12,7 @@ from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from rampe_guard.assembly import load_machine
+from rampe_guard.collision import load_arm
 from rampe_guard.evaluate.prediction import MEAN, PROCESS, RAMPE, ZERO, Prediction, assess
 from rampe_guard.evaluate.prediction_plot import draw
 from rampe_guard.evaluate.prediction_report import report
@@ -33,7 +33,7 @@ def evaluate(
         LogError: a log cannot be what the site file says, or there is nothing to predict.
     """
     site = load_site(site_path)
-    limits = load_machine(site).arm.limits
+    limits = load_arm(site.arm).limits
     runs = []
     for path in log_paths:
         log = read_csv_log(site, path, limits)

@@ -8,13 +8,14 @@ from collections.abc import Iterator, Sequence
 from rich.console import Console
 
 from rampe_guard import wire
-from rampe_guard.assembly import load_machine
+from rampe_guard.collision import load_arm
 from rampe_guard.core.events import SYSTEM_ZONE, AlertEvent
 from rampe_guard.errors import ConnectionFailedError, InterruptedReplayError
 from rampe_guard.evaluate.tally import Tally
 from rampe_guard.programs.scoring import closing_table
 from rampe_guard.runtime.connecting import connect_to
 from rampe_guard.runtime.csv_log import CsvLog, read_csv_log
+from rampe_guard.runtime.loading import load_telling
 from rampe_guard.runtime.messages import Scribe
 from rampe_guard.runtime.player import Frame, Player
 from rampe_guard.runtime.replay import replay
@@ -36,7 +37,7 @@ def replay_offline(
         InterruptedReplayError: it was told to stop before the end.
     """
     site = load_site(site_path)
-    machine = load_machine(site)
+    machine = load_telling(site)
     log = _read(read_csv_log(site, log_path, machine.arm.limits))
     for item in site.scene.moving:
         print(  # noqa: T201
@@ -74,7 +75,7 @@ def replay_live(
         ConnectionFailedError: no router, or nobody listens.
     """
     site = connect_to(load_site(site_path), endpoints)
-    log = _read(read_csv_log(site, log_path, load_machine(site).arm.limits))
+    log = _read(read_csv_log(site, log_path, load_arm(site.arm).limits))
     with Bus.open(site.zenoh) as bus:
         player = Player(bus, site)
         if not player.wait_for_listener(stop):

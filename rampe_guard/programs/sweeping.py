@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
+import numpy as np
+
 from rampe_guard import wire
-from rampe_guard.assembly import Sweeper
 from rampe_guard.core.types import Certificate
 from rampe_guard.errors import MessageError
+from rampe_guard.runtime.loading import load_telling
 from rampe_guard.settings import load_site
 
 _OUT_OF_REACH = (
@@ -18,7 +20,7 @@ _OUT_OF_REACH = (
 def sweep_lines(site_path: str, lines: Iterable[bytes]) -> Iterator[bytes]:
     """One reply a line; a line that is no motion gets the certificate ``unknown`` and a reason."""
     site = load_site(site_path)
-    sweeper = Sweeper(site)
+    sweeper = load_telling(site).sweeper
     n = len(site.actuator_names)
     for number, line in enumerate(lines, start=1):
         if not line.strip():
@@ -28,7 +30,8 @@ def sweep_lines(site_path: str, lines: Iterable[bytes]) -> Iterator[bytes]:
         except MessageError as error:
             yield wire.encode(_unknown(f"line {number}: {error}"))
             continue
-        result = sweeper.sweep(request.start, request.displacement, any_path=request.any_path)
+        start, displacement = np.array(request.start), np.array(request.displacement)
+        result = sweeper.sweep(start, displacement, any_path=request.any_path)
         yield wire.encode(
             wire.SweepReply(
                 certificate=result.certificate.value,

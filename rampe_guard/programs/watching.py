@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from rich.console import Console
 
 from rampe_guard import wire
-from rampe_guard.assembly import load_machine
+from rampe_guard.collision import load_arm
 from rampe_guard.errors import ConnectionFailedError
 from rampe_guard.runtime.connecting import connect_to
 from rampe_guard.runtime.stopping import StopFlag
@@ -21,14 +21,14 @@ from rampe_guard.view.watch import watch
 def watch_site(site_path: str, endpoints: Sequence[str], console: Console, stop: StopFlag) -> int:
     """Show a machine until told to stop; waits for a router if there is none."""
     site = connect_to(load_site(site_path), endpoints)
-    machine = stop.unless_stopped(lambda: load_machine(site))
-    if machine is None:
+    arm = stop.unless_stopped(lambda: load_arm(site.arm))
+    if arm is None:
         return 0
     bus = Bus.open_retrying(site.zenoh, stop, console.print, stop.wait)
     if bus is None:
         return 0
     with bus:
-        watch(Observer(bus, site, machine.arm.limits), stop, console)
+        watch(Observer(bus, site, arm.limits), stop, console)
     return 0
 
 

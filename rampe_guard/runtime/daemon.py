@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rampe_guard.assembly import Machine, load_machine
+from rampe_guard.assembly import Machine
 from rampe_guard.collision.canary import Canary
 from rampe_guard.errors import ConnectionFailedError, SettingsError
 from rampe_guard.runtime.canary_watch import CanaryWatch
 from rampe_guard.runtime.connecting import connect_to
+from rampe_guard.runtime.loading import load_telling
 from rampe_guard.runtime.say import Sayer
 from rampe_guard.runtime.stopping import StopFlag
 from rampe_guard.runtime.store_keeper import Keeper
@@ -47,8 +48,7 @@ def run(
         raise SettingsError(
             f"{site.path}: format: {site.format!r} is not supported by this version; use json"
         )
-    say.info("loading; the first time on a machine the sweep is compiled: a minute or two")
-    loaded = stop.unless_stopped(lambda: _load(site))
+    loaded = stop.unless_stopped(lambda: _load(site, say))
     if loaded is None:
         return 0
     machine, canary = loaded
@@ -70,9 +70,11 @@ def run(
     return UNTRUSTED if untrusted else 0
 
 
-def _load(site: Site) -> tuple[Machine, Canary]:
+def _load(site: Site, say: Sayer) -> tuple[Machine, Canary]:
     """Machine and canary, tried once: the worker tries it again before its first step."""
-    machine = load_machine(site)
+    machine = load_telling(site, say.info)
+    for note in machine.sweeper.notes:
+        say.info(note)
     canary = Canary(machine.arm, site.sweep)
     canary.check()
     return machine, canary

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable
 from typing import TextIO
@@ -65,20 +66,25 @@ class BuildLine:
         self._began_s = self._shown_s = None
 
 
-def load_telling(site: Site, say: Callable[[str], None], out: TextIO) -> Machine:
-    """`load_machine`, and a word on what takes long.
+def say_to_stderr(text: str) -> None:
+    """Say a sentence to who runs a command whose output goes elsewhere."""
+    sys.stderr.write(f"{text}\n")
+    sys.stderr.flush()
+
+
+def load_telling(site: Site, say: Callable[[str], None] = say_to_stderr) -> Machine:
+    """`load_machine`, and a word on what takes long; progress goes to stderr if a terminal.
 
     Args:
         site: as `load_site` returns it.
         say: takes sentences.
-        out: where progress is shown if it is a terminal.
 
     Raises:
         GeometryError: a URDF, mesh, linkage or scene object cannot be used.
     """
     if not kernel_cache.kept():
         say(COMPILING)
-    line = BuildLine(out, say)
+    line = BuildLine(sys.stderr, say)
     try:
         return load_machine(site, line)
     finally:

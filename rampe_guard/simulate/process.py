@@ -9,7 +9,7 @@ import argparse
 import sys
 from collections.abc import Iterator
 
-from rampe_guard.assembly import load_machine
+from rampe_guard.collision import load_arm
 from rampe_guard.errors import RampeGuardError
 from rampe_guard.resources import shipped_site
 from rampe_guard.runtime.connecting import connect_to
@@ -27,9 +27,9 @@ RATE_HZ = 100.0
 
 def frames(site: Site, cycles: int | None, seed: int, rate_hz: float) -> Iterator[Frame]:
     """The demo quarry's operator at work on the site's machine, stamped when sent."""
-    machine = load_machine(site)
+    limits = load_arm(site.arm).limits
     operator = quarry_operator(site.guard.actuators, seed)
-    simulated = build_machine(site.guard.actuators, machine.arm.limits)
+    simulated = build_machine(site.guard.actuators, limits)
     ticks = simulate(
         site.guard.actuators,
         operator,

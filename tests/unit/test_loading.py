@@ -104,7 +104,7 @@ def test_compiling_is_said_where_no_kernels_are_kept(
     monkeypatch.setattr(loading, "load_machine", lambda _site, _progress: None)
     for kept in (True, False):
         monkeypatch.setattr(kernel_cache, "kept", lambda kept=kept: kept)
-        load_telling(load_site(site), said.append, io.StringIO())
+        load_telling(load_site(site), said.append)
     assert said == [COMPILING]
     monkeypatch.undo()
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "none"))
@@ -112,7 +112,7 @@ def test_compiling_is_said_where_no_kernels_are_kept(
 
 
 def test_after_a_sweep_there_are_kernels_and_processes_share_them(site: str) -> None:
-    load_telling(load_site(site), lambda _text: None, io.StringIO())
+    load_telling(load_site(site))
     assert kernel_cache.kept()
     program = "from rampe_guard import kernel_cache; print(kernel_cache.kept())"
     answer = subprocess.run(
