@@ -7,7 +7,7 @@ from typing import Protocol
 from rampe_guard import wire
 
 PERIOD_S = 2.0
-"""Between two trials: each costs about a millisecond."""
+"""Between two trials: each costs a millisecond or two."""
 TELL_S = 1.5
 """How long a guard whose canary failed goes on to say so before it ends [s]."""
 
