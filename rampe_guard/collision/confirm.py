@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from rampe_guard.collision.exact import exact_shape, place, surface, touching
+from rampe_guard.collision.exact import exact_shape, inverse, place, surface, touching
 from rampe_guard.core.bounding_tree import NONE
 from rampe_guard.core.kinematics import skew
 from rampe_guard.core.scene import Halfspace, Mesh
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
     import fcl
 
-    from rampe_guard.collision.mesh import TriangleMesh
     from rampe_guard.core.bounding_tree import BoundingTree
     from rampe_guard.core.kinematics import Chain, JointMap
     from rampe_guard.core.scene import SolidObject
@@ -33,12 +32,12 @@ if TYPE_CHECKING:
 
     _Joint = tuple[JointMap, FloatArray, FloatArray, FloatArray | None]
 
-WHOLE = 50_000
-"""A mesh of at most so many triangles is asked about as a whole."""
+WHOLE = 4_000
+"""A surface of at most so many triangles is asked about as a whole: some 30 ms to build, once."""
 PATCH = 2_000
 """Of a larger one, so many triangles nearest to the contact."""
 KEPT = 16
-"""Patches of one mesh that are kept."""
+"""Patches of one surface that are kept."""
 
 
 class Confirmer:
@@ -46,14 +45,13 @@ class Confirmer:
 
     def __init__(
         self,
-        meshes: Sequence[TriangleMesh | None],
+        links: Sequence[BoundingTree | None],
         zones: Iterable[tuple[SolidObject, BoundingTree]],
     ) -> None:
-        """Take links' meshes in their own frames, and each object with its tree."""
-        self._meshes = meshes
-        self._links: dict[int, fcl.CollisionObject] = {}
+        """Take trees of links in their own frames, and each object with its tree."""
+        self._links = [None if tree is None else _Surface(tree) for tree in links]
         self._zones = {
-            item.name: _Target(item, tree)
+            item.name: _Surface(tree) if isinstance(item, Mesh) else exact_shape(item)
             for item, tree in zones
             if not isinstance(item, Halfspace)  # not safe in FCL
         }
@@ -62,28 +60,22 @@ class Confirmer:
         """Whether there is an object of this name that FCL may be asked about."""
         return zone in self._zones
 
-    def touches(self, link: int, pose: FloatArray, zone: str, point: FloatArray) -> bool | None:
-        """Whether a link touches an object that is known.
+    def touches(self, link: int, pose: FloatArray, zone: str, point: FloatArray) -> bool:
+        """Whether a link with geometry touches an object that is known.
 
         Args:
             link: its index.
             pose: where it is (4, 4), in the frame in which the scene gives the object.
             zone: name of the object.
             point: about where it touches (3,), in that frame [m].
-
-        Returns:
-            None where FCL has no shape that is to be trusted.
         """
-        other = self._zones[zone].near(point)
-        if other is None:
-            return None
-        body = self._links.get(link)
-        if body is None:
-            mesh = self._meshes[link]
-            if mesh is None:
-                return None
-            body = self._links[link] = surface(mesh.vertices, mesh.faces)
-        return touching(place(body, pose), other)
+        mine, other = self._links[link], self._zones[zone]
+        assert mine is not None  # noqa: S101  # for the reader of types
+        back = inverse(pose)
+        body = mine.near(back[:3, :3] @ point + back[:3, 3])
+        return touching(
+            place(body, pose), other.near(point) if isinstance(other, _Surface) else other
+        )
 
 
 class LinkPoses:
@@ -123,31 +115,27 @@ class LinkPoses:
 
 @dataclass(frozen=True, slots=True)
 class _Patch:
-    """A body that holds all of its mesh within ``reach`` of ``center`` [m]."""
+    """A body that holds all of its surface within ``reach`` of ``center`` [m]."""
 
     body: fcl.CollisionObject
     center: FloatArray
     reach: float
 
 
-class _Target:
-    """One object, whole or, if it is a large mesh, its parts near a point."""
+class _Surface:
+    """A mesh, whole or, if it is large, its parts near a point."""
 
-    def __init__(self, item: SolidObject, tree: BoundingTree) -> None:
-        self._item, self._tree = item, tree
+    def __init__(self, tree: BoundingTree) -> None:
+        self._tree = tree
         self._patches: list[_Patch] = []
 
-    def near(self, point: FloatArray) -> fcl.CollisionObject | None:
+    def near(self, point: FloatArray) -> fcl.CollisionObject:
         """What there is of it about a point (3,) [m]."""
         for patch in reversed(self._patches):
-            if np.linalg.norm(point - patch.center) <= 0.5 * patch.reach:
+            if 2.0 * math.dist(point, patch.center) <= patch.reach:
                 return patch.body
-        if isinstance(self._item, Mesh):
-            corners, reach = triangles_near(self._tree, point)
-            count = len(corners)
-            body = surface(corners.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3))
-        else:
-            body, reach = exact_shape(self._item), np.inf
+        corners, reach = triangles_near(self._tree, point)
+        body = surface(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
         self._patches = [*self._patches[1 - KEPT :], _Patch(body, point, reach)]
         return body
 

@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING
 import fcl
 import numpy as np
 
-from rampe_guard.core.scene import Box, Capsule, Cylinder, SolidObject, Sphere
+from rampe_guard.core.scene import Box, Capsule, Cylinder, Sphere
 
 if TYPE_CHECKING:
     from rampe_guard.collision.mesh import IntArray
     from rampe_guard.core.types import FloatArray
 
 
-def exact_shape(item: SolidObject) -> fcl.CollisionObject | None:
-    """An object as its own kind of shape, placed; None for halfspaces and meshes."""
+def exact_shape(item: Box | Sphere | Cylinder | Capsule) -> fcl.CollisionObject:
+    """An object as FCL's own kind of shape, placed as the scene places it."""
     match item:
         case Box():
             return _object(fcl.Box(*item.size_m), item.pose)
@@ -38,8 +38,6 @@ def exact_shape(item: SolidObject) -> fcl.CollisionObject | None:
                 return _object(fcl.Sphere(item.radius_m), pose)
             pose[:3, :3] = _turned_z((b - a) / length)
             return _object(fcl.Capsule(item.radius_m, length), pose)
-        case _:
-            return None
 
 
 def surface(vertices: FloatArray, faces: IntArray) -> fcl.CollisionObject:

@@ -92,7 +92,7 @@ class FclSweeper:
         self._behind_m = config.tolerance_m
         self._link_of = {name: link for link, name in enumerate(arm.link_names)}
         self._link_poses = LinkPoses(arm.chain, arm.joints)
-        self._confirmer = Confirmer(arm.meshes, solid)
+        self._confirmer = Confirmer(links, solid)
         self._sweep = Sweep(SweepProblem(motion, arm.link_names, links, zones), config)
         self._warm_up()
 

@@ -128,9 +128,10 @@ def test_of_a_large_mesh_the_part_about_the_contact_is_asked(
     # dented, so that it is not one convex part
     mesh = replace(mesh, vertices=mesh.vertices * (1 - 0.2 * (mesh.vertices[:, :1] > 0.9)))
     tree = build_tree(mesh)
+    monkeypatch.setattr(confirming, "WHOLE", len(mesh.faces))
     whole, reach = triangles_near(tree, np.zeros(3))
     assert (len(whole), reach) == (len(mesh.faces), np.inf)
-    monkeypatch.setattr(confirming, "WHOLE", 1000)
+    monkeypatch.setattr(confirming, "WHOLE", 500)
     monkeypatch.setattr(confirming, "PATCH", 200)
     point = np.array([-1.0, 0, 0])
     near, reach = triangles_near(tree, point)
@@ -140,14 +141,17 @@ def test_of_a_large_mesh_the_part_about_the_contact_is_asked(
     assert 0.0 < reach < 0.5
     assert {t.tobytes() for t in whole[within]} <= {t.tobytes() for t in near}
 
-    cube = box_mesh(np.array([0.2, 0.2, 0.2]))
+    cube = build_tree(box_mesh(np.array([0.2, 0.2, 0.2])))
     item = Mesh(name="m", margin_m=0, file="m.stl", scale=1.0, pose=np.eye(4))
+    asked = ((-1.05, True), (-1.15, False), (0.75, True), (0.95, False), (-1.0, True))
     confirmer = Confirmer((cube,), [(item, tree)])
-    touching = [
-        confirmer.touches(0, pose((x, 0, 0)), "m", np.array([x, 0, 0]))
-        for x in (-1.05, -1.15, 0.75, 0.95, -1.0)
-    ]
-    assert touching == [True, False, True, False, True]
+    for x, expected in asked:
+        assert confirmer.touches(0, pose((x, 0, 0)), "m", np.array([x, 0, 0])) is expected
+    # and the other way round: the link is the large mesh
+    box = Box(name="b", margin_m=0, size_m=(0.2, 0.2, 0.2), pose=pose((7, 0, 0)))
+    turned = Confirmer((tree,), [(box, cube)])
+    for x, expected in asked:
+        assert turned.touches(0, pose((7 - x, 0, 0)), "b", np.array([7.0, 0, 0])) is expected
     assert confirmer.knows("m")
     assert not confirmer.knows("self:tool")
 
