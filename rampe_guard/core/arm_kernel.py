@@ -81,20 +81,24 @@ def turn_joint(arm: ArmTables, j: int, theta: float, scratch: FloatArray) -> Non
 
 
 @inlined
-def frames_of(arm: ArmTables, theta: FloatArray, frames: FloatArray, scratch: FloatArray) -> None:
-    """Poses (J + 1, 3, 4) of all frames, the world first, for joint values (J,)."""
+def frames_of(
+    arm: ArmTables, theta: FloatArray, frames: FloatArray, scratch: FloatArray, upto: int
+) -> None:
+    """Poses (J + 1, 3, 4) of the frames up to one, the world first, for joint values (J,)."""
     for i in range(3):
         for k in range(4):
             frames[0, i, k] = 1.0 if i == k else 0.0
-    for j in range(len(theta)):
+    for j in range(upto):
         turn_joint(arm, j, theta[j], scratch)
         compose(frames[arm.joint[j].parent], scratch, frames[j + 1])
 
 
 @inlined
-def joints_at(arm: ArmTables, way: FloatArray, s: float, theta: FloatArray) -> None:
-    """Joint values (J,) at fraction s of a path ``way`` (2, n), kept inside the proven range."""
-    for j in range(len(theta)):
+def joints_at(
+    arm: ArmTables, way: FloatArray, s: float, theta: FloatArray, upto: int
+) -> None:
+    """Values of the first ``upto`` joints at fraction s of a path ``way`` (2, n), kept inside the proven range."""
+    for j in range(upto):
         i = arm.joint[j].actuator
         q = way[0, i] + s * way[1, i]
         q = min(max(q, arm.limits[0, i]), arm.limits[1, i])

@@ -113,7 +113,7 @@ def _decide(
 
     And for neither, how near it is to a contact there [m].
     """
-    place(arm, frames, pair, zone.pose, k.pose_a, k.pose_b, k.pose)
+    place(arm, frames, pair, zone.pose, k.pose_a[0], k.pose_b[0], k.pose)
     link = pair.link
     link_pose(arm, frames, link, k.pose)
     ball = S.node[pair.a].ball
@@ -135,7 +135,7 @@ def _decide(
     verdict, near = FREE, np.inf
     if pair.other < 0 and S.node[pair.b].count != HALFSPACE:
         other = S.node[pair.b].ball
-        ox, oy, oz = moved(k.pose_b, other[0], other[1], other[2])
+        ox, oy, oz = moved(k.pose_b[0], other[0], other[1], other[2])
         away = math.sqrt((x - ox) ** 2 + (y - oy) ** 2 + (z - oz) ** 2) - ball[3] - other[3]
         if away - margin > travel:
             return FREE, np.inf
@@ -150,7 +150,7 @@ def _decide(
         leaf = not (can_split(S, a) or can_split(S, b))
         goal = (-np.inf if leaf else rounding, rounding + travel, SHARE if leaf else LOOSE)
         lower, upper, nx, ny, nz = distance(
-            S, shape_of(S, a), k.pose_a, shape_of(S, b), k.pose_b, n, goal, k.work
+            S, shape_of(S, a), k.pose_a[0], shape_of(S, b), k.pose_b[0], n, goal, k.work
         )
         if first:
             way[0], way[1], way[2] = nx, ny, nz
@@ -163,7 +163,7 @@ def _decide(
             if room > along:
                 continue
         if not leaf:
-            top = push_halves(S, k, top, a, b, 0.0, (nx, ny, nz), travel + margin)
+            top = push_halves(S, k, top, a, b, 0.0, (nx, ny, nz), travel + margin, 0)
             if top < 0:
                 return UNKNOWN, 0.0
             continue
@@ -234,14 +234,14 @@ def any_way(
             moves[j] = max(
                 abs(joint_value(arm, j, low) - theta[j]), abs(joint_value(arm, j, high) - theta[j])
             )
-        frames_of(arm, theta, path.now, k.pose)
+        frames_of(arm, theta, path.now[0], k.pose, joints)
         if used + many > len(pool) or top + 2 > len(box):
             return UNKNOWN
         left, widest, most, nearest = 0, -1, 0.0, np.inf
         for m in range(first, first + many):
             p = int(pool[m])
             found, near = _decide(
-                arm, S, pairs.row[p], zones[pairs.row[p].zone], path.now, moves, reach, k
+                arm, S, pairs.row[p], zones[pairs.row[p].zone], path.now[0], moves, reach, k
             )
             if found == POSSIBLE:
                 for i in range(actuators):

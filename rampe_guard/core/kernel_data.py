@@ -14,14 +14,14 @@ from rampe_guard.core.bounding_tree import NONE
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rampe_guard.core.bounding_tree import BoundingTree
+    from rampe_guard.core.bounding_tree import BoundingTree, Int32Array
     from rampe_guard.core.types import FloatArray
 
 Records: TypeAlias = Any
 """A record array of one of the types below, or one record of it."""
 
 CELLS = 8
-"""Cells of a path's grid."""
+"""Most cells of a path's grid."""
 STACK = 1024
 
 _POSE = (3, 4)
@@ -36,7 +36,7 @@ NODE = np.dtype(
         ("inner_first", "i4"),  # of a root: points on its connected parts
         ("inner_count", "i4"),
         ("radius", "f8"),
-        ("size", "f8"),
+        ("bulge", "f8"),
         ("ball", "f8", 4),
     ],
     align=True,
@@ -130,12 +130,14 @@ SCRATCH = np.dtype(
         ("node", "i4", (STACK, 2)),  # stack of node pairs
         ("at", "f8", (STACK, 4)),  # fraction and direction of each
         ("work", "f8", (16, 4)),  # of gjk.distance
-        ("pose_a", "f8", _POSE),
-        ("pose_b", "f8", _POSE),
+        ("pose_a", "f8", (2, *_POSE)),  # of both sides: here, and a step ahead
+        ("pose_b", "f8", (2, *_POSE)),
         ("pose", "f8", _POSE),
         ("point", "f8", (2, 3)),  # nearest points of the last leaf pair
         ("far", "f8", 2),  # see walk_kernel.push_halves
         ("spent", "i8", 2),  # queries so far, and their limit
+        ("cells", "i8"),  # of the path's grid
+        ("again", "i8"),  # 1: the pairs' last directions are worth a try
         ("doubts", "i8"),
         ("only", "i8"),  # group that is walked again; negative for all
     ],
@@ -190,11 +192,29 @@ class ArmTables(NamedTuple):
     limits: FloatArray
 
 
+BROAD = np.dtype(
+    [("left", "i4"), ("right", "i4"), ("zone", "i4"), ("ball", "f8", 4)],
+    align=True,
+)
+"""A node of the tree of zones: a ball round its zones, margins included; zone NONE: not a leaf."""
+
+
 class Pairs(NamedTuple):
-    """Who must stay apart: PAIR records (P,), those of one zone side by side; MOVERs (M,)."""
+    """Who must stay apart.
+
+    Attributes:
+        row: PAIR records (P,), those of one zone side by side.
+        mover: MOVER records (M,).
+        broad: BROAD records of zones that stand still, node 0 the root; may be empty.
+        loose: zones that are not in that tree (k,).
+        of: pair of each zone and link, or NONE (Z, L).
+    """
 
     row: Records
     mover: Records
+    broad: Records
+    loose: Int32Array
+    of: Int32Array
 
 
 class Path(NamedTuple):
@@ -208,7 +228,7 @@ class Path(NamedTuple):
         segment: ends of each link's capsule in the world at the grid (L, K + 1, 6) [m].
         bounds: rate, curvature, bend per mover and cell (M, K, 3) [m], see `walk_kernel`.
         fastest: largest rate of each mover (M,) [m].
-        now: frames at one fraction (J + 1, 3, 4).
+        now: frames at two fractions (2, J + 1, 3, 4).
         now_theta: its joint values (J,).
     """
 
@@ -233,7 +253,7 @@ def empty_path(joints: int, links: int, movers: int, actuators: int) -> Path:
         segment=np.zeros((links, CELLS + 1, 6)),
         bounds=np.zeros((movers, CELLS, 3)),
         fastest=np.zeros(movers),
-        now=np.zeros((joints + 1, 3, 4)),
+        now=np.zeros((2, joints + 1, 3, 4)),
         now_theta=np.zeros(joints),
     )
 
@@ -253,7 +273,7 @@ def stack_trees(trees: Sequence[BoundingTree]) -> tuple[Shapes, list[int]]:
         own.right = np.where(tree.right == NONE, NONE, tree.right + nodes[number])
         own.triangle_first = tree.triangle_first + triangles[number]
         own.triangle_count = tree.triangle_count
-        own.radius, own.size, own.ball = tree.radius, tree.size, tree.ball
+        own.radius, own.bulge, own.ball = tree.radius, tree.size, tree.ball
         own.inner_first[0] = inner[number]
         own.inner_count[0] = len(tree.inner)
     points = [tree.vertices for tree in trees] + [tree.corners.reshape(-1, 3) for tree in trees]

@@ -19,6 +19,10 @@ from rampe_guard.core.kernel_data import CELLS, ArmTables, Pairs, Path, Records,
 from rampe_guard.core.types import FloatArray
 
 
+FINE_M = 0.12
+"""Motion that a cell is worth [m]."""
+
+
 @inlined
 def moved(pose: FloatArray, x: float, y: float, z: float) -> tuple[float, float, float]:
     """A point taken by a pose (3, 4)."""
@@ -30,7 +34,7 @@ def moved(pose: FloatArray, x: float, y: float, z: float) -> tuple[float, float,
 
 
 @inlined
-def lay_path(arm: ArmTables, S: Shapes, pairs: Pairs, path: Path) -> None:
+def lay_path(arm: ArmTables, S: Shapes, pairs: Pairs, path: Path, cells: int) -> None:
     """Fill in everything that depends on start, displacement and end.
 
     Args:
@@ -38,6 +42,7 @@ def lay_path(arm: ArmTables, S: Shapes, pairs: Pairs, path: Path) -> None:
         S: shapes.
         pairs: for its movers.
         path: way and end are set.
+        cells: how many to cut the path into, at most CELLS.
     """
     joints = len(arm.joint)
     links = len(arm.link)
@@ -48,11 +53,11 @@ def lay_path(arm: ArmTables, S: Shapes, pairs: Pairs, path: Path) -> None:
     least = np.empty(joints)
     most = np.empty(joints)
     size = np.empty(joints)
-    h = path.end[0] / CELLS
+    h = path.end[0] / cells
     path.fastest[:] = 0.0
-    for c in range(CELLS + 1):
-        joints_at(arm, path.way, c * h, path.theta[c])
-        frames_of(arm, path.theta[c], path.frames[c], scratch)
+    for c in range(cells + 1):
+        joints_at(arm, path.way, c * h, path.theta[c], joints)
+        frames_of(arm, path.theta[c], path.frames[c], scratch, joints)
         for link in range(links):
             if arm.link[link].root < 0:
                 continue
@@ -64,7 +69,7 @@ def lay_path(arm: ArmTables, S: Shapes, pairs: Pairs, path: Path) -> None:
                 at[0], at[1], at[2] = x, y, z
     for j in range(joints):
         size[j] = abs(path.way[1, arm.joint[j].actuator])
-    for c in range(CELLS):
+    for c in range(cells):
         for j in range(joints):
             i = arm.joint[j].actuator
             moves[j] = abs(path.theta[c + 1, j] - path.theta[c, j])
@@ -92,10 +97,30 @@ def lay_path(arm: ArmTables, S: Shapes, pairs: Pairs, path: Path) -> None:
 
 
 @inlined
-def move_to(arm: ArmTables, path: Path, s: float, scratch: FloatArray) -> None:
-    """Frames of the arm at fraction s, into ``path.now``."""
-    joints_at(arm, path.way, s, path.now_theta)
-    frames_of(arm, path.now_theta, path.now, scratch)
+def move_to(
+    arm: ArmTables, path: Path, s: float, pair: Records, slot: int, scratch: FloatArray
+) -> None:
+    """Frames of the arm that carry a pair at fraction s, into ``path.now[slot]``."""
+    upto = arm.link[pair.link].frame
+    if pair.other >= 0:
+        upto = max(upto, arm.link[pair.other].frame)
+    joints_at(arm, path.way, s, path.now_theta, upto)
+    frames_of(arm, path.now_theta, path.now[slot], scratch, upto)
+
+
+@inlined
+def cells_of(arm: ArmTables, path: Path) -> int:
+    """How many cells a path is worth: about one for each FINE_M of its farthest motion."""
+    longest = 0.0
+    for link in range(len(arm.link)):
+        motion = 0.0
+        for j in range(len(arm.joint)):
+            i = arm.joint[j].actuator
+            steepest = max(abs(arm.slopes[0, j, 0, 0]), abs(arm.slopes[1, j, 0, 0]))
+            if steepest < np.inf:
+                motion += arm.reach[j, link] * steepest * abs(path.way[1, i])
+        longest = max(longest, motion)
+    return min(max(int(longest * path.end[0] / FINE_M), 1), CELLS)
 
 
 @inlined

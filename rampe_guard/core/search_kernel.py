@@ -19,6 +19,7 @@ from rampe_guard.core.inside_kernel import inside
 from rampe_guard.core.kernel_data import CELLS, ArmTables, Pairs, Path, Records, Shapes
 from rampe_guard.core.path_kernel import (
     capsule_distance,
+    cells_of,
     lay_path,
     move_to,
     moved,
@@ -46,6 +47,7 @@ class Ask(NamedTuple):
         limit: most queries.
         together: 1 if only the worst of all zones is wanted.
         sharp: 1 if the clearance at the start is wanted too.
+        again: 1 if the last sweep began near here, so that its directions are worth a try.
     """
 
     tolerance: float
@@ -55,6 +57,86 @@ class Ask(NamedTuple):
     limit: int
     together: int
     sharp: int
+    again: int
+
+
+@inlined
+def _look(
+    arm: ArmTables,
+    S: Shapes,
+    pairs: Pairs,
+    zones: Records,
+    path: Path,
+    k: Records,
+    doubt: Records,
+    found: Records,
+    ask: Ask,
+    p: int,
+) -> None:
+    """Coarse bounds of one pair: it goes on the list, or only lowers the bounds of its group."""
+    cells = k.cells
+    h = path.end[0] / cells
+    middle = cells // 2
+    pair = pairs.row[p]
+    z = pair.zone
+    g = 0 if ask.together == 1 else z
+    margin = zones[z].margin
+    link = pair.link
+    radius = arm.link[link].capsule[6]
+    ball = S.node[pair.b].ball
+    plane = S.node[pair.b].count == HALFSPACE
+    still = pair.other < 0
+    nx, ny, nz, floor = 0.0, 0.0, 0.0, 0.0
+    ox, oy, oz = 0.0, 0.0, 0.0
+    if plane:
+        nx, ny, nz, floor = halfspace_normal(S, S.node[pair.b].first, zones[z].pose)
+    elif still:
+        ox, oy, oz = moved(zones[z].pose, ball[0], ball[1], ball[2])
+        if ask.slack > FAR:
+            # one look at the middle of the path settles most
+            travel = max(middle, cells - middle) * h * pair_fastest(pair, path)
+            away = capsule_distance(path.segment[link, middle], radius, ox, oy, oz)
+            away -= ball[3] + travel + margin
+            if away > ask.touch:
+                _pass_over(found, g, p, away, away)
+                return
+    entry = doubt[k.doubts]
+    least, before, start = np.inf, 0.0, 0.0
+    for c in range(cells + 1):
+        segment = path.segment[link, c]
+        if plane:
+            first = nx * segment[0] + ny * segment[1] + nz * segment[2]
+            second = nx * segment[3] + ny * segment[4] + nz * segment[5]
+            away = floor - max(first, second) - radius - margin
+        else:
+            if not still:
+                ox, oy, oz = _link_center(arm, path.frames[c], pair.other, ball)
+            away = capsule_distance(segment, radius, ox, oy, oz) - ball[3] - margin
+        if c == 0:
+            start = away
+        else:
+            rate, _, _ = pair_bounds(pair, path, c - 1)
+            motion = rate * h
+            low = max(0.5 * (before + away - motion), min(before, away) - motion)
+            entry.cell[c - 1] = low
+            least = min(least, low)
+        before = away
+    if least > ask.touch and ask.slack > FAR:
+        _pass_over(found, g, p, least, start)
+        return
+    entry.pair = p
+    entry.least = least
+    entry.start = start
+    k.doubts += 1
+
+
+@inlined
+def _pass_over(found: Records, g: int, p: int, least: float, start: float) -> None:
+    """A pair that is clear all the way still bounds the distances of its group."""
+    if least < found[g].bound:
+        found[g].bound = least
+        found[g].nearest = p
+    found[g].now = min(found[g].now, start)
 
 
 @inlined
@@ -69,72 +151,50 @@ def _coarse(
     found: Records,
     ask: Ask,
 ) -> None:
-    """Fill in ``doubt``; what is clear already only lowers the bounds of its group."""
-    h = path.end[0] / CELLS
-    d = np.empty(CELLS + 1)
-    near = ask.touch
-    count = 0
-    middle = CELLS // 2
-    for z in range(len(zones)):
-        if zones[z].active == 0 or zones[z].first == zones[z].last:
-            continue
-        g = 0 if ask.together == 1 else z
-        margin = zones[z].margin
-        p0 = zones[z].first
-        b = pairs.row[p0].b
-        plane = S.node[b].count == HALFSPACE
-        still = pairs.row[p0].other < 0
-        nx, ny, nz, floor = 0.0, 0.0, 0.0, 0.0
-        ox, oy, oz = 0.0, 0.0, 0.0
-        if plane:
-            nx, ny, nz, floor = halfspace_normal(S, S.node[b].first, zones[z].pose)
-        elif still:
-            center = S.node[b].ball
-            ox, oy, oz = moved(zones[z].pose, center[0], center[1], center[2])
-        for p in range(p0, zones[z].last):
-            link = pairs.row[p].link
-            radius = arm.link[link].capsule[6]
-            fastest = pair_fastest(pairs.row[p], path)
-            travel = 0.5 * path.end[0] * fastest
-            ball = S.node[pairs.row[p].b].ball
-            if still and not plane:
-                # one look at the middle of the path settles most
-                segment = path.segment[link, middle]
-                away = capsule_distance(segment, radius, ox, oy, oz) - ball[3] - travel - margin
-                if away > near and away > found[g].least - ask.slack and ask.sharp == 0:
-                    if away < found[g].bound:
-                        found[g].bound = away
-                        found[g].nearest = p
-                    found[g].now = min(found[g].now, away)
-                    continue
-            for c in range(CELLS + 1):
-                segment = path.segment[link, c]
-                if plane:
-                    first = nx * segment[0] + ny * segment[1] + nz * segment[2]
-                    second = nx * segment[3] + ny * segment[4] + nz * segment[5]
-                    d[c] = floor - max(first, second) - radius - margin
-                else:
-                    if not still:
-                        ox, oy, oz = _link_center(arm, path.frames[c], pairs.row[p].other, ball)
-                    d[c] = capsule_distance(segment, radius, ox, oy, oz) - ball[3] - margin
-            least = np.inf
-            for c in range(CELLS):
-                rate, _, _ = pair_bounds(pairs.row[p], path, c)
-                low = max(0.5 * (d[c] + d[c + 1] - rate * h), min(d[c], d[c + 1]) - rate * h)
-                doubt[count].cell[c] = low
-                least = min(least, low)
-            if least > near and ask.slack > FAR:
-                if least < found[g].bound:
-                    found[g].bound = least
-                    found[g].nearest = p
-                found[g].now = min(found[g].now, d[0])
+    """Fill in ``doubt``.
+
+    If only the worst zone is wanted, zones that stand still are found through their tree.
+    """
+    cells = k.cells
+    middle = cells // 2
+    share = max(middle, cells - middle) * path.end[0] / cells
+    treed = ask.together == 1 and ask.slack > FAR and len(pairs.broad) > 0
+    stack = np.empty(64, dtype=np.int32)
+    k.doubts = 0
+    if treed:
+        for m in range(len(pairs.mover)):
+            link = pairs.mover[m].link
+            if pairs.mover[m].common != 0:
                 continue
-            doubt[count].pair = p
-            doubt[count].least = least
-            doubt[count].start = d[0]
-            count += 1
-    k.doubts = count
-    _sort(doubt, count)
+            radius = arm.link[link].capsule[6]
+            travel = share * path.fastest[m]
+            stack[0] = 0
+            top = 1
+            while top > 0:
+                top -= 1
+                node = pairs.broad[stack[top]]
+                ball = node.ball
+                away = capsule_distance(
+                    path.segment[link, middle], radius, ball[0], ball[1], ball[2]
+                )
+                away -= ball[3] + travel
+                if away > ask.touch:
+                    found[0].bound = min(found[0].bound, away)
+                    found[0].now = min(found[0].now, away)
+                elif node.zone < 0:
+                    stack[top] = node.left
+                    stack[top + 1] = node.right
+                    top += 2
+                elif zones[node.zone].active == 1 and pairs.of[node.zone, link] >= 0:
+                    p = pairs.of[node.zone, link]
+                    _look(arm, S, pairs, zones, path, k, doubt, found, ask, p)
+    count = len(pairs.loose) if treed else len(zones)
+    for i in range(count):
+        z = pairs.loose[i] if treed else i
+        if zones[z].active == 1:
+            for p in range(zones[z].first, zones[z].last):
+                _look(arm, S, pairs, zones, path, k, doubt, found, ask, p)
+    _sort(doubt, k.doubts)
 
 
 @inlined
@@ -183,7 +243,8 @@ def _walk_all(
     ``aim`` is that of `walk`.
     """
     touch, slack = aim
-    h = path.end[0] / CELLS
+    cells = k.cells
+    h = path.end[0] / cells
     for i in range(k.doubts):
         d = doubt[i].order
         p = doubt[d].pair
@@ -195,14 +256,14 @@ def _walk_all(
         goal = max(touch, found[g].least - slack)
         first, last = -1, -1
         passed = np.inf
-        for c in range(CELLS):
-            if (c + 1) * h <= begin and c < CELLS - 1:
+        for c in range(cells):
+            if (c + 1) * h <= begin and c < cells - 1:
                 continue
             if doubt[d].cell[c] <= goal:
                 if first < 0:
                     first = c
                 last = c
-        for c in range(CELLS):
+        for c in range(cells):
             if (first < 0 or c < first or c > last) and (c + 1) * h > begin:
                 passed = min(passed, doubt[d].cell[c])
         if passed < found[g].bound:
@@ -212,7 +273,7 @@ def _walk_all(
         if first < 0:
             continue
         s0 = max(begin, first * h)
-        s1 = path.end[0] if last == CELLS - 1 else (last + 1) * h
+        s1 = path.end[0] if last == cells - 1 else (last + 1) * h
         if s0 >= found[g].stop:
             continue
         before = found[g].bound
@@ -234,6 +295,7 @@ def _seed(
     ask: Ask,
 ) -> None:
     """Meet small distances first: what is known not to be the least need not be walked sharply."""
+    cells = k.cells
     for i in range(k.doubts):
         d = doubt[i].order
         p = doubt[d].pair
@@ -242,8 +304,8 @@ def _seed(
         if math.isnan(found[g].coarse):
             continue
         margin = zones[z].margin
-        for c in range(0, CELLS + 1, 2):
-            low = min(doubt[d].cell[max(c - 1, 0)], doubt[d].cell[min(c, CELLS - 1)])
+        for c in range(0, cells + 1, 2):
+            low = min(doubt[d].cell[max(c - 1, 0)], doubt[d].cell[min(c, cells - 1)])
             if low >= found[g].least - ask.slack:
                 continue
             limits = (found[g].least + margin, ask.slack, margin)
@@ -277,11 +339,11 @@ def _contained(
             continue
         z = pairs.row[p].zone
         g = 0 if ask.together == 1 else z
-        place(arm, path.frames[0], pairs.row[p], zones[z].pose, k.pose_a, k.pose_b, k.pose)
+        place(arm, path.frames[0], pairs.row[p], zones[z].pose, k.pose_a[0], k.pose_b[0], k.pose)
         a, b = pairs.row[p].a, pairs.row[p].b
         for side in range(2):
             own, other = (a, b) if side == 0 else (b, a)
-            pose, frame = (k.pose_a, k.pose_b) if side == 0 else (k.pose_b, k.pose_a)
+            pose, frame = (k.pose_a[0], k.pose_b[0]) if side == 0 else (k.pose_b[0], k.pose_a[0])
             if S.node[own].count == HALFSPACE or S.node[other].count == HALFSPACE:
                 continue
             for j in range(
@@ -325,12 +387,12 @@ def _zone_distance(
         if s == 0.0 and doubt[d].start >= known - slack:
             continue
         margin = zones[z].margin
-        move_to(arm, path, s, k.pose)
+        move_to(arm, path, s, pairs.row[p], 0, k.pose)
         least = nearest(
             arm,
             S,
             pairs,
-            path.now,
+            path.now[0],
             zones[z].pose,
             p,
             k,
@@ -383,15 +445,15 @@ def _start(
         margin = zones[z].margin
         before, after = 0.0, 0.0
         for look in range(2):
-            move_to(arm, path, 0.0 if look == 0 else ask.probe, k.pose)
+            move_to(arm, path, 0.0 if look == 0 else ask.probe, pairs.row[p], 0, k.pose)
             limits = ((best if look == 0 else FAR) + margin, 0.0, 0.0)
-            away = nearest(arm, S, pairs, path.now, zones[z].pose, p, k, limits)
+            away = nearest(arm, S, pairs, path.now[0], zones[z].pose, p, k, limits)
             if math.isnan(away):
                 found[g].closing = 1  # the budget is gone: nothing shows the contrary
                 if touched:
                     found[g].now = FAR
                 else:
-                    found[g].now = max(min(found[g].now, doubt[d].start), found[g].bound)
+                    found[g].now = found[g].bound  # the start is a part of the way
                 return
             if look == 0:
                 before = away
@@ -432,7 +494,7 @@ def _refute(
     s = found[g].stop
     if s == np.inf or s == 0.0:
         return True
-    c = min(int(s * CELLS / path.end[0]), CELLS - 1)
+    c = min(int(s * k.cells / path.end[0]), k.cells - 1)
     rate, _, _ = pair_bounds(pairs.row[found[g].hit[0]], path, c)
     ahead = min(s + (ask.tolerance / rate if rate > 0.0 else np.inf), path.end[0])
     kept = found[g].nearest
@@ -468,7 +530,9 @@ def search(
         found[g].closing = 1
         found[g].confirmed = math.nan
     k.spent[0], k.spent[1] = 0, ask.limit
-    lay_path(arm, S, pairs, path)
+    k.again = ask.again
+    k.cells = cells_of(arm, path)
+    lay_path(arm, S, pairs, path, k.cells)
     _coarse(arm, S, pairs, zones, path, k, doubt, found, ask)
     _contained(arm, S, pairs, zones, path, k, doubt, found, ask)
     g, rung, begin = 0, 0, 0.0

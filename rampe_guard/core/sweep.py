@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 Group: TypeAlias = tuple[Any, ...]
 """One GROUP record as a tuple."""
+AGAIN_M = 0.1
+"""A sweep that begins nearer than this to where the last one did tries its directions [m]."""
 TOUCH_SHARE = 0.1
 """Share of the contact tolerance that counts as contact until a look ahead refutes it."""
 
@@ -45,6 +47,7 @@ class Sweep:
 
     def __init__(self, problem: SweepProblem, config: SweepConfig) -> None:
         self.problem, self.config = problem, config
+        self._last = np.full(problem.arm.lower.shape, 1e9)
         self._every = list(range(len(problem.zones)))
         self._solid = frozenset(problem.solid)
         self._group = {index: number for number, index in enumerate(problem.solid)}
@@ -167,9 +170,17 @@ class Sweep:
                 limit=config.max_queries,
                 together=int(worst),
                 sharp=int(clearance),
+                again=self._near_last(start),
             ),
         )
         return found
+
+    def _near_last(self, start: FloatArray) -> int:
+        """Whether the last sweep began so near that its directions are worth a try."""
+        arm = self.problem.arm
+        moved = np.abs(start - self._last)[arm.actuator] @ arm.coefficients
+        self._last = start
+        return int(moved.max(initial=0.0) < AGAIN_M)
 
     def _place(
         self, placed: Mapping[str, Placement | None], asked: list[int]

@@ -9,6 +9,7 @@ import numpy as np
 
 from rampe_guard.core.bounding_tree import NONE, BoundingTree, single
 from rampe_guard.core.arm_tables import arm_tables
+from rampe_guard.core.broad import broad_tree
 from rampe_guard.core.kernel_data import (
     DOUBT,
     GROUP,
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from rampe_guard.core.arm_motion import ArmMotion
+    from rampe_guard.core.bounding_tree import Int32Array
     from rampe_guard.core.scene import ActuatorLimit
     from rampe_guard.core.types import FloatArray
 
@@ -164,7 +166,29 @@ def _pairs(
     mover = room(MOVER, len(order))
     for one, (link, common) in zip(mover, order, strict=True):
         one.link, one.common = link, common
-    return Pairs(row=row, mover=mover)
+    of = np.full((len(fixed), len(links)), NONE, dtype=np.int32)
+    for p, (link, _, _, _, number) in enumerate(rows):
+        of[number, link] = p
+    broad, loose = _broad(problem, of, row)
+    return Pairs(row=row, mover=mover, broad=broad, loose=loose, of=of)
+
+
+def _broad(problem: SweepProblem, of: Int32Array, row: Records) -> tuple[Records, Int32Array]:
+    """The tree of all zones that stand still and have a ball, and the rest."""
+    still, loose, balls = [], [], []
+    for number, index in enumerate(problem.solid):
+        zone = problem.zones[index]
+        pairs = of[number][of[number] != NONE]
+        if not len(pairs):
+            continue
+        ball = problem.shapes.node.ball[row.b[pairs[0]]]
+        if isinstance(zone, Zone) and not zone.placed and np.isfinite(ball).all():
+            still.append(number)
+            balls.append([*ball[:3], ball[3] + zone.margin_m])
+        else:
+            loose.append(number)
+    tree = broad_tree(np.array(balls).reshape(-1, 4), still)
+    return tree, np.array(loose, dtype=np.int32)
 
 
 def _capsule(tree: BoundingTree | None) -> FloatArray:

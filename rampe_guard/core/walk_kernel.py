@@ -23,11 +23,10 @@ from __future__ import annotations
 import math
 import numpy as np
 
-from rampe_guard.core.arm_kernel import frames_of
 from rampe_guard.core.bounding_tree import HALFSPACE
 from rampe_guard.core.compiled import inlined
 from rampe_guard.core.gjk import distance, gap
-from rampe_guard.core.kernel_data import CELLS, STACK, ArmTables, Pairs, Path, Records, Shapes
+from rampe_guard.core.kernel_data import STACK, ArmTables, Pairs, Path, Records, Shapes
 from rampe_guard.core.path_kernel import (
     move_to,
     moved,
@@ -68,7 +67,7 @@ def can_split(S: Shapes, node: int) -> bool:
 @inlined
 def size_of(S: Shapes, node: int) -> float:
     """About how far a node reaches beyond what it holds [m]; triangles are exact."""
-    return 0.0 if node >= S.nodes else S.node[node].size
+    return 0.0 if node >= S.nodes else S.node[node].bulge
 
 
 @inlined
@@ -93,6 +92,7 @@ def push_halves(
     s: float,
     n: tuple[float, float, float],
     bar: float,
+    slot: int,
 ) -> int:
     """Put the pairs of halves of the looser node on the stack; those beyond ``bar`` are clear.
 
@@ -116,7 +116,7 @@ def push_halves(
     for i in range(count):
         half = (S.node[node].left if i == 0 else S.node[node].right) if first < 0 else first + i
         x, y = (half, b) if cut_a else (a, half)
-        clear = ball_gap(S, x, k.pose_a, y, k.pose_b)
+        clear = ball_gap(S, x, k.pose_a[slot], y, k.pose_b[slot])
         if clear > bar:
             k.far[0] = min(k.far[0], clear - k.far[1])
             continue
@@ -130,6 +130,19 @@ def push_halves(
             k.node[top - 1, i] = k.node[top - 2, i]
             k.node[top - 2, i] = kept
     return top
+
+
+@inlined
+def _first_direction(S: Shapes, pair: Records, k: Records, slot: int) -> None:
+    """Put a first guess on the stack: the pair's last, or from center to center in a slot."""
+    way = pair.way
+    x, y, z = way[0], way[1], way[2]
+    if slot >= 0 and S.node[pair.b].count != HALFSPACE:
+        p, q = S.node[pair.a].ball, S.node[pair.b].ball
+        ax, ay, az = moved(k.pose_a[slot], p[0], p[1], p[2])
+        bx, by, bz = moved(k.pose_b[slot], q[0], q[1], q[2])
+        x, y, z = bx - ax, by - ay, bz - az
+    k.at[0, 1], k.at[0, 2], k.at[0, 3] = x, y, z
 
 
 @inlined
@@ -159,10 +172,9 @@ def nearest(
         nearer than that less slack; NaN if the budget is gone.
     """
     known, slack, enough = limits
-    place(arm, frames, pairs.row[p], still, k.pose_a, k.pose_b, k.pose)
+    place(arm, frames, pairs.row[p], still, k.pose_a[0], k.pose_b[0], k.pose)
     k.node[0, 0], k.node[0, 1] = pairs.row[p].a, pairs.row[p].b
-    way = pairs.row[p].way
-    k.at[0, 1], k.at[0, 2], k.at[0, 3] = way[0], way[1], way[2]
+    _first_direction(S, pairs.row[p], k, -1 if k.again == 1 else 0)
     top = 1
     while top > 0:
         top -= 1
@@ -178,12 +190,12 @@ def nearest(
         share = EXACT if leaf else LOOSE
         goal = (-np.inf if leaf else max(rounding, 0.0), bar + rounding, share)
         lower, upper, nx, ny, nz = distance(
-            S, shape_of(S, a), k.pose_a, shape_of(S, b), k.pose_b, n, goal, k.work
+            S, shape_of(S, a), k.pose_a[0], shape_of(S, b), k.pose_b[0], n, goal, k.work
         )
         if lower - rounding > bar:
             continue
         if not leaf:
-            top = push_halves(S, k, top, a, b, 0.0, (nx, ny, nz), bar)
+            top = push_halves(S, k, top, a, b, 0.0, (nx, ny, nz), bar, 0)
             if top < 0:
                 return math.nan
             continue
@@ -220,6 +232,21 @@ def _step(
 
 
 @inlined
+def _pose_at(
+    arm: ArmTables,
+    pair: Records,
+    path: Path,
+    still: FloatArray,
+    k: Records,
+    s: float,
+    slot: int,
+) -> None:
+    """Poses of both sides of a pair at a fraction, into a slot."""
+    move_to(arm, path, s, pair, slot, k.pose)
+    place(arm, path.now[slot], pair, still, k.pose_a[slot], k.pose_b[slot], k.pose)
+
+
+@inlined
 def walk(
     arm: ArmTables,
     S: Shapes,
@@ -251,15 +278,18 @@ def walk(
     z = pairs.row[p].zone
     margin = zones[z].margin
     still = zones[z].pose
-    cell = path.end[0] / CELLS
+    cells = k.cells
+    cell = path.end[0] / cells
     fastest = pair_fastest(pairs.row[p], path)
     k.node[0, 0], k.node[0, 1] = pairs.row[p].a, pairs.row[p].b
     k.at[0, 0] = s0
+    _first_direction(S, pairs.row[p], k, -1)
     way = pairs.row[p].way
-    k.at[0, 1], k.at[0, 2], k.at[0, 3] = way[0], way[1], way[2]
     k.far[0] = np.inf
     top = 1
     first = True
+    slot = 0  # of the poses here; the other is for those ahead
+    here = -1.0  # fraction of the poses in the slot
     while top > 0:
         top -= 1
         a, b = k.node[top, 0], k.node[top, 1]
@@ -268,14 +298,15 @@ def walk(
         shape_a, shape_b = shape_of(S, a), shape_of(S, b)
         rounding = radius_of(S, a) + radius_of(S, b)
         leaf = not (can_split(S, a) or can_split(S, b))
-        here = -1.0  # fraction of the frames in path.now
         known = math.nan  # gap along n at s
         while s < min(s1, found[g].stop):
             target = margin + max(touch, found[g].least - 0.5 * slack)
             if here != s:
-                move_to(arm, path, s, k.pose)
-                place(arm, path.now, pairs.row[p], still, k.pose_a, k.pose_b, k.pose)
+                _pose_at(arm, pairs.row[p], path, still, k, s, slot)
                 here = s
+                if first and k.again == 0:
+                    _first_direction(S, pairs.row[p], k, slot)
+                    n = (k.at[0, 1], k.at[0, 2], k.at[0, 3])
             upper = np.inf
             lower = known
             if not lower - rounding > target:
@@ -290,7 +321,7 @@ def walk(
                     min(SHARP, TOUCH_SHARE * touch / bar) if leaf else LOOSE,
                 )
                 lower, upper, nx, ny, nz = distance(
-                    S, shape_a, k.pose_a, shape_b, k.pose_b, n, goal, k.work
+                    S, shape_a, k.pose_a[slot], shape_b, k.pose_b[slot], n, goal, k.work
                 )
                 n = (nx, ny, nz)
                 if first:
@@ -308,11 +339,11 @@ def walk(
                     found[g].stop = s
                     hit = found[g].hit
                     hit[0], hit[1], hit[2] = p, a, b
-                    _contact_point(S, pairs, path, p, b, n, k, found[g].point)
+                    _contact_point(S, pairs.row[p], path.now[slot], b, n, k, found[g].point)
                     break
                 k.far[1] = fastest * (min(s1, found[g].stop) - s)
                 bar = target + k.far[1]
-                top = push_halves(S, k, top, a, b, s, n, bar)
+                top = push_halves(S, k, top, a, b, s, n, bar, slot)
                 if top < 0:
                     found[g].unproven = min(found[g].unproven, s)
                     return False
@@ -320,8 +351,8 @@ def walk(
             # steps keep to a little less, so that each is worth something
             target = margin + max(0.5 * touch, found[g].least - slack)
             room = lower - rounding - target
-            c = min(int(s / cell), CELLS - 1)
-            if (c + 1) * cell <= s and c + 1 < CELLS:
+            c = min(int(s / cell), cells - 1)
+            if (c + 1) * cell <= s and c + 1 < cells:
                 c += 1  # s is a cell's end, up to rounding
             rest = min((c + 1) * cell, s1, found[g].stop) - s
             if rest <= 0.0:
@@ -333,14 +364,14 @@ def walk(
                 found[g].bound = min(found[g].bound, known - rounding - margin)
                 s += rest
                 continue
-            move_to(arm, path, s + longer, k.pose)
-            place(arm, path.now, pairs.row[p], still, k.pose_a, k.pose_b, k.pose)
-            here = s + longer
-            ahead = gap(S, shape_a, k.pose_a, shape_b, k.pose_b, n)
+            there = 1 - slot
+            _pose_at(arm, pairs.row[p], path, still, k, s + longer, there)
+            ahead = gap(S, shape_a, k.pose_a[there], shape_b, k.pose_b[there], n)
             sure = min(lower, ahead) - stray - rounding
             if sure >= target:
                 found[g].bound = min(found[g].bound, sure - margin)
                 s += longer
+                slot, here = there, s
                 known = ahead if longer >= 0.5 * rest else math.nan
                 continue
             step = linear
@@ -350,11 +381,9 @@ def walk(
                 known = math.nan
                 continue
             if not leaf and size_of(S, a) + size_of(S, b) > room:
-                move_to(arm, path, s, k.pose)
-                place(arm, path.now, pairs.row[p], still, k.pose_a, k.pose_b, k.pose)
                 k.far[1] = fastest * (min(s1, found[g].stop) - s)
                 bar = target + k.far[1]
-                top = push_halves(S, k, top, a, b, s, n, bar)
+                top = push_halves(S, k, top, a, b, s, n, bar, slot)
                 if top < 0:
                     found[g].unproven = min(found[g].unproven, s)
                     return False
@@ -369,9 +398,8 @@ def walk(
 @inlined
 def _contact_point(
     S: Shapes,
-    pairs: Pairs,
-    path: Path,
-    p: int,
+    pair: Records,
+    frames: FloatArray,
     b: int,
     n: tuple[float, float, float],
     k: Records,
@@ -382,10 +410,4 @@ def _contact_point(
     x = k.work[12, 0] - r * n[0]
     y = k.work[12, 1] - r * n[1]
     z = k.work[12, 2] - r * n[2]
-    out[0], out[1], out[2] = moved(path.now[pairs.row[p].common], x, y, z)
-
-
-@inlined
-def posture(arm: ArmTables, theta: FloatArray, frames: FloatArray, pose: FloatArray) -> None:
-    """Frames of the arm at joint values (J,)."""
-    frames_of(arm, theta, frames, pose)
+    out[0], out[1], out[2] = moved(frames[pair.common], x, y, z)
