@@ -10,6 +10,8 @@ from rampe_guard.core.types import FloatArray
 
 DIRECT, CYLINDER_PIVOT, CYLINDER_SIDE, FOUR_BAR, TABLE = range(5)
 LEVELS = 10
+NARROW = 16.0
+"""About so many intervals of the tables bound the slope over one cell of a path."""
 
 
 @inlined
@@ -130,14 +132,16 @@ def slope_bounds(arm: ArmTables, j: int, qa: float, qb: float) -> tuple[float, f
     a = (qa - arm.joint[j].base) / arm.joint[j].span
     b = (qb - arm.joint[j].base) / arm.joint[j].span
     low, width = min(a, b), max(abs(b - a), 1e-12)
-    level = min(max(int(math.floor(-math.log2(width))), 0), LEVELS - 1)
+    # many narrow intervals together are sharper than a wide one
+    level = min(max(int(math.floor(math.log2(NARROW / width))), 0), LEVELS - 1)
     size = 1 << level
-    index = min(max(int(math.floor(low * size)), 0), size - 1)
-    beyond = min(index + 1, size - 1)
-    return (
-        min(arm.slopes[0, j, level, index], arm.slopes[0, j, level, beyond]),
-        max(arm.slopes[1, j, level, index], arm.slopes[1, j, level, beyond]),
-    )
+    first = min(max(int(math.floor(low * size)), 0), size - 1)
+    last = min(max(int(math.floor((low + width) * size)), first), size - 1)
+    least, most = math.inf, -math.inf
+    for index in range(first, last + 1):
+        least = min(least, arm.slopes[0, j, level, index])
+        most = max(most, arm.slopes[1, j, level, index])
+    return least, most
 
 
 @inlined

@@ -47,6 +47,8 @@ def arm_tables(arm: ArmMotion, roots: Sequence[int], capsules: Sequence[FloatArr
     joint.constant = chain.origin[:, :3]
     joint.sine, joint.versine = _rodrigues(chain)
     joint.base, joint.span = arm.base, arm.span
+    finest = np.abs(np.array(arm.slopes)[:, :, -1]).max(axis=0)
+    joint.steepest = np.where(np.isfinite(finest), finest, 0.0).max(axis=1, initial=0.0)
     link.frame, link.root = chain.link_frame, roots
     link.origin, link.capsule = chain.link_origin[:, :3], capsules
     return ArmTables(

@@ -57,6 +57,7 @@ JOINT = np.dtype(
         ("numbers", "f8", 12),  # multiplier, offset, then those of the drive
         ("base", "f8"),  # of the dyadic tables of dθ/dq
         ("span", "f8"),
+        ("steepest", "f8"),  # about the largest |dθ/dq|, for choosing cells only
     ],
     align=True,
 )

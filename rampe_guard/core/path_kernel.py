@@ -116,9 +116,7 @@ def cells_of(arm: ArmTables, path: Path) -> int:
         motion = 0.0
         for j in range(len(arm.joint)):
             i = arm.joint[j].actuator
-            steepest = max(abs(arm.slopes[0, j, 0, 0]), abs(arm.slopes[1, j, 0, 0]))
-            if steepest < np.inf:
-                motion += arm.reach[j, link] * steepest * abs(path.way[1, i])
+            motion += arm.reach[j, link] * arm.joint[j].steepest * abs(path.way[1, i])
         longest = max(longest, motion)
     return min(max(int(longest * path.end[0] / FINE_M), 1), CELLS)
 

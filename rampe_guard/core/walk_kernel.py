@@ -388,6 +388,9 @@ def walk(
                     found[g].unproven = min(found[g].unproven, s)
                     return False
                 break
+            if not s + step > s:  # no bound of the motion: nothing can be proven from here on
+                found[g].unproven = min(found[g].unproven, s)
+                return False
             found[g].bound = min(found[g].bound, target - margin)
             s += step
             known = math.nan
