@@ -54,7 +54,7 @@ def joint_value(arm: ArmTables, j: int, q: float) -> float:
             i += 1
         share = (q - x[i]) / (x[i + 1] - x[i])
         theta = arm.table[1, i] + share * (arm.table[1, i + 1] - arm.table[1, i])
-    return p[0] * theta + p[1]
+    return float(p[0] * theta + p[1])
 
 
 @inlined
@@ -96,10 +96,8 @@ def frames_of(
 
 
 @inlined
-def joints_at(
-    arm: ArmTables, way: FloatArray, s: float, theta: FloatArray, upto: int
-) -> None:
-    """Values of the first ``upto`` joints at fraction s of a path ``way`` (2, n), kept inside the proven range."""
+def joints_at(arm: ArmTables, way: FloatArray, s: float, theta: FloatArray, upto: int) -> None:
+    """Values of the first ``upto`` joints at fraction s of a way (2, n), in the proven range."""
     for j in range(upto):
         i = arm.joint[j].actuator
         q = way[0, i] + s * way[1, i]

@@ -27,7 +27,7 @@ NONE = -1
 HALFSPACE = 0
 """``count`` of a halfspace: vertices are its outward normal, then (offset, -, -)."""
 CYLINDER = -1
-"""``count`` of a cylinder: vertices are its center, half its axis, then (radius, -, -)."""
+"""``count`` of a cylinder: vertices are its center, half its axis, and two radii across it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,8 +94,9 @@ def single(vertices: FloatArray, radius: float = 0.0) -> BoundingTree:
 
 def cylinder(center: FloatArray, half_axis: FloatArray, radius: float) -> BoundingTree:
     """The tree of one cylinder: center (3,), half its axis (3,), radius [m]."""
-    reach = float(np.hypot(np.linalg.norm(half_axis), radius))
-    vertices = np.array([center, half_axis, [radius, 0.0, 0.0]], dtype=float)
+    reach = float(np.hypot(np.linalg.norm(half_axis), radius)) * (1.0 + 1e-9)
+    _, _, axes = np.linalg.svd(np.asarray(half_axis, dtype=float)[None], full_matrices=True)
+    vertices = np.array([center, half_axis, radius * axes[1], radius * axes[2]], dtype=float)
     return _special(vertices, CYLINDER, np.array([[*center, reach]]), vertices[:1])
 
 

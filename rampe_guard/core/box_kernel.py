@@ -5,8 +5,9 @@ monotone, so in a box round a center each joint stays within moves_j = max |Δθ
 there, and no point of link l gets farther from where it is at the center than
 Σ_j moves_j · reach_j. A pair that is farther apart at the center than that, plus its margin,
 touches nowhere in the box. Along a direction n that separates the pair at the center one may also
-count only motion along n, of first order, plus half of Σ_j reach_j moves_j (moves_j + 2 Σ_i moves_i)
-(i the turning joints before j), which bounds the second order; the smaller of both counts.
+count only motion along n, of first order, plus half of
+Σ_j reach_j moves_j (moves_j + 2 Σ_i moves_i), i the turning joints before j, which bounds the
+second order; the smaller of both counts.
 
 Pairs that are clear in a box are clear in its halves, so halves are asked only about the rest. A
 box is halved across the actuator that moves the undecided link most. A center in contact is a

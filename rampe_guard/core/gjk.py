@@ -18,8 +18,8 @@ import math
 
 import numpy as np
 
-from rampe_guard.core.compiled import inlined
 from rampe_guard.core.bounding_tree import CYLINDER, HALFSPACE
+from rampe_guard.core.compiled import inlined
 from rampe_guard.core.kernel_data import Shapes
 from rampe_guard.core.types import FloatArray
 
@@ -41,18 +41,16 @@ def support(
     lz = sign * (nx * pose[0, 2] + ny * pose[1, 2] + nz * pose[2, 2])
     X, Y, Z = S.xyz[0], S.xyz[1], S.xyz[2]
     if count == CYLINDER:
-        # center, half axis, (radius, -, -)
-        ax, ay, az = X[first + 1], Y[first + 1], Z[first + 1]
-        r = X[first + 2]
-        square = ax * ax + ay * ay + az * az
-        along = (lx * ax + ly * ay + lz * az) / square
-        px, py, pz = lx - along * ax, ly - along * ay, lz - along * az
-        across = math.sqrt(px * px + py * py + pz * pz)
+        # center, half axis, two radii across it: what is added to the axis is exactly across it
+        along = lx * X[first + 1] + ly * Y[first + 1] + lz * Z[first + 1]
+        one = lx * X[first + 2] + ly * Y[first + 2] + lz * Z[first + 2]
+        two = lx * X[first + 3] + ly * Y[first + 3] + lz * Z[first + 3]
+        across = math.sqrt(one * one + two * two)
         side = 1.0 if along >= 0.0 else -1.0
-        grow = r / across if across > TINY else 0.0
-        vx = X[first] + side * ax + grow * px
-        vy = Y[first] + side * ay + grow * py
-        vz = Z[first] + side * az + grow * pz
+        one, two = (one / across, two / across) if across > 0.0 else (1.0, 0.0)
+        vx = X[first] + side * X[first + 1] + one * X[first + 2] + two * X[first + 3]
+        vy = Y[first] + side * Y[first + 1] + one * Y[first + 2] + two * Y[first + 3]
+        vz = Z[first] + side * Z[first + 1] + one * Z[first + 2] + two * Z[first + 3]
     else:
         best = -np.inf
         at = first
@@ -77,7 +75,7 @@ def gap(
     pose_b: FloatArray,
     n: tuple[float, float, float],
 ) -> float:
-    """gap(n) of two shapes (first, count) at their poses [m]; n points from a to b."""
+    """The gap of two shapes (first, count) along n at their poses [m]; n points from a to b."""
     low, _, _, _ = support(S, b[0], b[1], pose_b, n, -1.0)
     high, _, _, _ = support(S, a[0], a[1], pose_a, n, 1.0)
     return low - high - ROUNDING_M
@@ -173,7 +171,7 @@ def _outside(w: FloatArray, i: int, j: int, k: int, other: int) -> bool:
     nx, ny, nz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
     inner = nx * (w[other, 0] - ax) + ny * (w[other, 1] - ay) + nz * (w[other, 2] - az)
     origin = -(nx * ax + ny * ay + nz * az)
-    return inner * origin <= 0.0
+    return bool(inner * origin <= 0.0)
 
 
 @inlined

@@ -44,6 +44,7 @@ from rampe_guard.core.types import (
     Inputs,
     JoystickSample,
     PathSweeper,
+    Placement,
     ZoneSweep,
 )
 from rampe_guard.core.velocity import VelocityEstimator
@@ -231,6 +232,8 @@ class Guard:
                 if self._moving.restless(zone.zone, now_s):
                     zone = replace(zone, closing=True)  # whatever the arm does
                 shown = self._annunciator.shown(zone.zone)
+                if shown and self._rules.grazes(zone):
+                    zone = self._sharper(q, forecast, zone, placed)
                 found = self._rules.judge(forecast, zone, shown, stop_s)
                 evidence.setdefault(zone.zone, []).append(found)
                 sweeps.append(_summary(forecast, zone))
@@ -255,6 +258,19 @@ class Guard:
             return self._monitor.health(now_s)
         health = self._monitor.health(now_s, self._moving.weaknesses(now_s))
         return replace(health, objects=self._moving.health(now_s))
+
+    def _sharper(
+        self,
+        q: FloatArray,
+        forecast: Forecast,
+        zone: ZoneSweep,
+        placed: dict[str, Placement | None],
+    ) -> ZoneSweep:
+        """A free zone with its true clearance: a weak bound must not hold an alert."""
+        only = frozenset([zone.zone])
+        zones = self._sweeper.sweep(q, forecast.displacement, only=only, placed=placed).zones
+        sharp = next(found for found in zones if found.zone == zone.zone)
+        return replace(sharp, closing=zone.closing or sharp.closing)
 
     def _moment(self, health: Health, now_s: float) -> Moment:
         newest = self._newest

@@ -28,7 +28,9 @@ DEPTH = 128
 
 
 @inlined
-def _crossing(S: Shapes, t: int, x: float, y: float, z: float, ray: tuple[float, float, float]) -> int:
+def _crossing(
+    S: Shapes, t: int, x: float, y: float, z: float, ray: tuple[float, float, float]
+) -> int:
     """+1 or -1 if the ray leaves or enters through triangle t, 0 if not, 9 if unsure."""
     v = S.corner + 3 * t
     ax, ay, az = S.xyz[0, v], S.xyz[1, v], S.xyz[2, v]
@@ -58,7 +60,9 @@ def _crossing(S: Shapes, t: int, x: float, y: float, z: float, ray: tuple[float,
 
 
 @inlined
-def _meets(ball: FloatArray, x: float, y: float, z: float, ray: tuple[float, float, float], square: float) -> bool:
+def _meets(
+    ball: FloatArray, x: float, y: float, z: float, ray: tuple[float, float, float], square: float
+) -> bool:
     """Whether a ray can meet a ball."""
     px, py, pz = ball[0] - x, ball[1] - y, ball[2] - z
     along = px * ray[0] + py * ray[1] + pz * ray[2]
@@ -68,7 +72,7 @@ def _meets(ball: FloatArray, x: float, y: float, z: float, ray: tuple[float, flo
         return True
     if along <= 0.0:
         return False
-    return apart - along * along / square <= r2
+    return bool(apart - along * along / square <= r2)
 
 
 @inlined

@@ -70,10 +70,15 @@ class LevelRules:
             return Level.CAUTION
         return Level.CLEAR
 
+    def grazes(self, sweep: ZoneSweep) -> bool:
+        """Whether a free path is not known to keep clear of the deadband."""
+        clearance = sweep.clearance_m
+        free = sweep.certificate is Certificate.FREE
+        return free and clearance is not None and clearance < self.alerts.deadband_m
+
     def _near(self, forecast: Forecast, sweep: ZoneSweep, shown: Level) -> Evidence:
         """A free path that passes within the deadband keeps the level that is shown."""
-        clearance = sweep.clearance_m
-        grazing = clearance is not None and clearance < self.alerts.deadband_m and sweep.closing
+        grazing = self.grazes(sweep) and sweep.closing
         highest = Level.IMMINENT if isinstance(forecast, StoppingForecast) else Level.WARNING
         level = min(shown, highest) if grazing and shown else Level.CLEAR
         return Evidence(level, _source(forecast, sweep), 0.0, None, sweep)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+
 import numpy as np
 
 from rampe_guard.core.arm_kernel import (
@@ -17,7 +18,6 @@ from rampe_guard.core.arm_kernel import (
 from rampe_guard.core.compiled import inlined
 from rampe_guard.core.kernel_data import CELLS, ArmTables, Pairs, Path, Records, Shapes
 from rampe_guard.core.types import FloatArray
-
 
 FINE_M = 0.12
 """Motion that a cell is worth [m]."""
@@ -159,7 +159,7 @@ def place(
 def pair_fastest(pair: Records, path: Path) -> float:
     """Largest rate of both sides of a pair together on the whole path [m]."""
     other = pair.other_mover
-    return path.fastest[pair.mover] + (path.fastest[other] if other >= 0 else 0.0)
+    return float(path.fastest[pair.mover] + (path.fastest[other] if other >= 0 else 0.0))
 
 
 @inlined

@@ -16,7 +16,7 @@ from rampe_guard.core.bounding_tree import HALFSPACE
 from rampe_guard.core.compiled import compiled, inlined
 from rampe_guard.core.gjk import ROUNDING_M, halfspace_normal
 from rampe_guard.core.inside_kernel import inside
-from rampe_guard.core.kernel_data import CELLS, ArmTables, Pairs, Path, Records, Shapes
+from rampe_guard.core.kernel_data import ArmTables, Pairs, Path, Records, Shapes
 from rampe_guard.core.path_kernel import (
     capsule_distance,
     cells_of,
@@ -470,11 +470,15 @@ def _start(
             found[g].closing = 1 if approaching else 0
         elif approaching:
             found[g].closing = 1
-    least -= EXACT * abs(least) + ROUNDING_M
     if touched:
-        found[g].now = min(least, 2.0 * ask.touch)
-    else:
-        found[g].now = max(min(found[g].now, least), found[g].bound)
+        # where no surfaces are near, one side is inside the other
+        inside = -zones[pairs.row[found[g].hit[0]].zone].margin
+        found[g].now = least if least < FAR else inside
+        return
+    least -= EXACT * abs(least) + ROUNDING_M
+    # that the start is clear is proven, by however little
+    proven = found[g].bound if found[g].bound < FAR else NOISE_M * ask.touch
+    found[g].now = max(min(found[g].now, least), proven)
 
 
 @inlined

@@ -218,9 +218,7 @@ class Sweep:
         zone = problem.zones[problem.solid[number]]
         return self._entry(cast("Zone | SelfZone", zone), found, end, moving=moving)
 
-    def _entry(
-        self, zone: Zone | SelfZone, found: Group, end: float, *, moving: bool
-    ) -> ZoneSweep:
+    def _entry(self, zone: Zone | SelfZone, found: Group, end: float, *, moving: bool) -> ZoneSweep:
         stop, _, bound, unproven, now, _, confirmed, point, hit, nearest, closing = found
         touched = stop < np.inf
         if bound >= FAR and not touched and unproven == np.inf:

@@ -37,7 +37,8 @@ class AnyWay:
         Args:
             zones: as they are now.
             result: of the straight way.
-            start, displacement: of all ways (n,).
+            start: of all ways (n,).
+            displacement: of all ways (n,).
         """
         touched = [z for z in result.zones if z.certificate is Certificate.CONTACT]
         if touched:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rampe_guard.core.bounding_tree import NONE, BoundingTree, single
 from rampe_guard.core.arm_tables import arm_tables
+from rampe_guard.core.bounding_tree import NONE, BoundingTree, single
 from rampe_guard.core.broad import broad_tree
 from rampe_guard.core.kernel_data import (
     DOUBT,
@@ -25,7 +25,7 @@ from rampe_guard.core.kernel_data import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
     from rampe_guard.core.arm_motion import ArmMotion
     from rampe_guard.core.bounding_tree import Int32Array
@@ -123,7 +123,7 @@ class SweepProblem:
         }
 
 
-def _pairs(
+def _pairs(  # noqa: C901 - one pass over zones and links
     problem: SweepProblem,
     links: Sequence[BoundingTree | None],
     object_root: dict[str, int],

@@ -21,6 +21,7 @@ The obstacles are closed sets; margins and growth add to ``target``, radii are t
 from __future__ import annotations
 
 import math
+
 import numpy as np
 
 from rampe_guard.core.bounding_tree import HALFSPACE
@@ -79,7 +80,7 @@ def ball_gap(S: Shapes, a: int, pose_a: FloatArray, b: int, pose_b: FloatArray) 
     ax, ay, az = moved(pose_a, p[0], p[1], p[2])
     bx, by, bz = moved(pose_b, q[0], q[1], q[2])
     x, y, z = bx - ax, by - ay, bz - az
-    return math.sqrt(x * x + y * y + z * z) - p[3] - q[3] - 1e-9
+    return float(math.sqrt(x * x + y * y + z * z) - p[3] - q[3] - 1e-9)
 
 
 @inlined

@@ -74,8 +74,16 @@ class Referee:
         result = self._sweeper.sweep(start, position - start, clearance=False)
         events: list[ContactEvent] = []
         for zone in result.zones:
-            events.extend(self._judge(zone, from_s, time_s))
+            events.extend(self._judge(self._start_known(zone, start), from_s, time_s))
         return tuple(events)
+
+    def _start_known(self, zone: ZoneSweep, start: FloatArray) -> ZoneSweep:
+        """The same, with the clearance at the start sharp where a contact waits for its end."""
+        free = zone.certificate is Certificate.FREE
+        if zone.zone not in self._open or not (free or (zone.contact_fraction or 0.0) > 0.0):
+            return zone
+        still = self._sweeper.sweep(start, np.zeros_like(start), only=frozenset([zone.zone]))
+        return replace(zone, clearance_now_m=still.zones[0].clearance_now_m)
 
     def _judge(self, zone: ZoneSweep, from_s: float, to_s: float) -> list[ContactEvent]:
         events: list[ContactEvent] = []

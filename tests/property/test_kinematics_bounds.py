@@ -7,9 +7,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from rampe_guard.core.arm_motion import ArmMotion
+from rampe_guard.core.bounding_tree import single
+from rampe_guard.core.config import SweepConfig
 from rampe_guard.core.drive import CylinderDrive, DirectDrive, Drive, FourBarDrive, TableDrive
 from rampe_guard.core.kinematics import Chain, JointMap
-from rampe_guard.core.sweep_path import ArmMotion, swept_path
+from rampe_guard.core.sweep import Sweep
+from rampe_guard.core.sweep_problem import SweepProblem, Zone
+from rampe_guard.core.types import FloatArray
 
 DRIVES: list[tuple[Drive, float, float]] = [
     (DirectDrive(), -2.0, 2.0),
@@ -61,19 +66,34 @@ def test_no_point_outruns_its_bounds(
     motion: tuple[ArmMotion, list[np.ndarray], np.ndarray, np.ndarray],
 ) -> None:
     arm, points, start, displacement = motion
-    path = swept_path(arm, start, displacement, 1.0, 0.05)
-    for cell in range(path.cells):
-        a, b = path.fractions[cell], path.fractions[cell + 1]
+    far = Zone("far", 0.0, single(np.full((1, 3), 1e3)))
+    names = [str(link) for link in range(len(points))]
+    problem = SweepProblem(arm, names, [single(cloud) for cloud in points], [far])
+    Sweep(problem, SweepConfig()).run(start, displacement, clearance=False)
+    cells = int(problem.scratch.cells)
+    for cell in range(cells):
+        a, b = cell / cells, (cell + 1) / cells
         s = np.linspace(a, b, 12)
         poses = arm.link_poses(start + s[:, None] * displacement)
-        for link, cloud in enumerate(points):
+        for mover, link in enumerate(problem.pairs.mover.link):
+            cloud = points[link]
+            rate, curvature, bend = problem.path.bounds[mover, cell]
             ways = np.einsum("kij,vj->kvi", poses[:, link, :3, :3], cloud)
             ways += poses[:, None, link, :3, 3]
+            assert np.allclose(
+                ways[0], _posed(problem, cell, link, cloud), atol=1e-9
+            )  # the kernel's kinematics are those of numpy
             for i in range(len(s)):
                 moved = np.linalg.norm(ways - ways[i], axis=2).max(axis=1)
-                allowed = path.rate[link, cell] * np.abs(s - s[i])
-                assert (moved <= allowed + 1e-9).all()
+                assert (moved <= rate * np.abs(s - s[i]) + 1e-9).all()
             share = ((s - a) / (b - a))[:, None, None]
             chord = (1.0 - share) * ways[0] + share * ways[-1]
             stray = np.linalg.norm(ways - chord, axis=2).max()
-            assert stray <= path.stray[link, cell] + 1e-9
+            h = b - a
+            assert stray <= curvature * h * h / 8.0 + bend * h + 1e-9
+
+
+def _posed(problem: SweepProblem, cell: int, link: int, cloud: FloatArray) -> FloatArray:
+    frame = problem.path.frames[cell, problem.arm.chain.link_frame[link]]
+    whole = np.vstack([frame, [0.0, 0.0, 0.0, 1.0]]) @ problem.arm.chain.link_origin[link]
+    return np.asarray(cloud @ whole[:3, :3].T + whole[:3, 3])
