@@ -66,7 +66,13 @@ class Sweeper:
         self._sweeper = load_machine(site).sweeper
 
     def sweep(
-        self, start: npt.ArrayLike, displacement: npt.ArrayLike, *, any_path: bool = True
+        self,
+        start: npt.ArrayLike,
+        displacement: npt.ArrayLike,
+        *,
+        any_path: bool = True,
+        clearance: bool = True,
+        worst: bool = False,
     ) -> SweepResult:
         """Sweep every link along a straight actuator path.
 
@@ -74,13 +80,17 @@ class Sweeper:
             start: (n,) actuator positions [unit].
             displacement: (n,) [unit].
             any_path: also answer for every monotone path.
+            clearance: also find the least clearance; certificates are sooner done without.
+            worst: only the worst zone is wanted, which is sooner done than all of them.
 
         Raises:
             ValueError: wrong length, or a value that is not finite.
         """
         start = np.asarray(start, dtype=np.float64)
         displacement = np.asarray(displacement, dtype=np.float64)
-        return self._sweeper.sweep(start, displacement, any_path=any_path)
+        return self._sweeper.sweep(
+            start, displacement, any_path=any_path, clearance=clearance, worst=worst
+        )
 
 
 def guard_for(site: Site, start_s: float = 0.0) -> Guard:

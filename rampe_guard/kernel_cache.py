@@ -21,17 +21,19 @@ def choose_folder() -> None:
 
     Where no folder of the user's can be written, numba's own choice is left to it.
     """
-    if "NUMBA_CACHE_DIR" in os.environ:
-        return
     core = Path(__file__).parent / "core"
     digest = hashlib.sha256()
     for pattern in KERNELS:
         for file in sorted(core.glob(pattern)):
             digest.update(file.read_bytes())
+    name = f"kernels-{digest.hexdigest()[:16]}"
+    told = Path(os.environ.get("NUMBA_CACHE_DIR", "")).name
+    if told and (told == name or not told.startswith("kernels-")):
+        return  # by the user, or by the process that started this one, for the same kernels
     chosen = os.environ.get("RAMPE_GUARD_CACHE")
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     base = Path(chosen) if chosen else home / "rampe-guard"
-    folder = base / f"kernels-{digest.hexdigest()[:16]}"
+    folder = base / name
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:

@@ -31,7 +31,7 @@ def sweep_lines(site_path: str, lines: Iterable[bytes]) -> Iterator[bytes]:
             yield wire.encode(_unknown(f"line {number}: {error}"))
             continue
         start, displacement = np.array(request.start), np.array(request.displacement)
-        result = sweeper.sweep(start, displacement, any_path=request.any_path)
+        result = sweeper.sweep(start, displacement, any_path=request.any_path, worst=True)
         yield wire.encode(
             wire.SweepReply(
                 certificate=result.certificate.value,
@@ -41,6 +41,7 @@ def sweep_lines(site_path: str, lines: Iterable[bytes]) -> Iterator[bytes]:
                 contact_point_m=result.contact_point_m,
                 clearance_m=result.clearance_m,
                 any_path=None if result.any_path is None else result.any_path.value,
+                witness=result.witness,
                 elapsed_ms=result.elapsed_ms,
                 error=_OUT_OF_REACH if result.certificate is Certificate.UNKNOWN else None,
             )

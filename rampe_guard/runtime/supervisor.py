@@ -21,7 +21,6 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
-from pathlib import Path
 from types import FrameType
 
 UNTRUSTED = 3
@@ -91,9 +90,6 @@ class Supervisor:
         environment.pop(RESTARTED, None)
         if cause is not None:
             environment[RESTARTED] = cause
-        if Path(environment.get("NUMBA_CACHE_DIR", "")).name.startswith("kernels-"):
-            # our own choice for the kernels as they are now: a later guard chooses for itself
-            del environment["NUMBA_CACHE_DIR"]
         try:
             # a session of its own: what a terminal sends comes to this process alone, once
             child = subprocess.Popen(  # noqa: S603 - our own command line

@@ -36,7 +36,14 @@ class SweepReply(Message, frozen=True, kw_only=True):
     contact_point_m: f.Point
     clearance_m: f.Clearance
     any_path: f.AnyPath
-    elapsed_ms: Annotated[float | None, Meta(description="Time of the sweep alone [ms].")]
+    witness: Annotated[
+        tuple[float, ...] | None,
+        Meta(
+            description="With any_path possible: a position between start and end at which the arm"
+            " touches [rad or m]; null where none is known."
+        ),
+    ] = None
+    elapsed_ms: Annotated[float | None, Meta(description="Time of the sweep alone [ms].")] = None
     error: Annotated[
         str | None, Meta(description="Why no sweep was made; the certificate is unknown then.")
     ] = None

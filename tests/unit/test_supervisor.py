@@ -151,13 +151,13 @@ def test_a_hang_up_that_was_switched_off_stays_so(tmp_path: Path) -> None:
 
 
 def test_the_kernels_folder_is_chosen_anew_unless_a_user_chose_it(tmp_path: Path) -> None:
-    show = "print(os.environ.get('NUMBA_CACHE_DIR'))"
-    for set_to, seen in (("/x/kernels-0123", "None"), ("/x/mine", "/x/mine")):
+    show = "import os, rampe_guard\nprint(os.environ['NUMBA_CACHE_DIR'])"
+    own = os.environ["NUMBA_CACHE_DIR"]  # of these kernels, as this process chose it
+    for set_to, same in (("/x/kernels-0123", False), ("/x/mine", True), (own, True)):
         program = f"import os; os.environ['NUMBA_CACHE_DIR'] = {set_to!r}\n{SUPERVISE}"
-        args = ["-c", program, "import os\n" + show]
-        with Process(tmp_path, "supervisor", args) as parent:
+        with Process(tmp_path, "supervisor", ["-c", program, show]) as parent:
             assert parent.popen.wait(20.0) == 0
-            assert parent.out.strip() == seen
+            assert (parent.out.strip() == set_to) is same
 
 
 def test_it_loads_nothing_that_may_crash(tmp_path: Path) -> None:
