@@ -134,7 +134,6 @@ SCRATCH = np.dtype(
         ("pose_a", "f8", (2, *_POSE)),  # of both sides: here, and a step ahead
         ("pose_b", "f8", (2, *_POSE)),
         ("pose", "f8", _POSE),
-        ("point", "f8", (2, 3)),  # nearest points of the last leaf pair
         ("far", "f8", 2),  # see walk_kernel.push_halves
         ("spent", "i8", 2),  # queries so far, and their limit
         ("cells", "i8"),  # of the path's grid

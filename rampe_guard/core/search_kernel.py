@@ -60,26 +60,43 @@ class Ask(NamedTuple):
     again: int
 
 
+class Task(NamedTuple):
+    """One sweep: the problem, its path, room to work in, and where the answers go.
+
+    Attributes:
+        arm, S, pairs: see `kernel_data`.
+        zones: ZONE records. path: the way is set, the rest is laid out by `search`.
+        k: one SCRATCH record. doubt: DOUBT records. found: GROUP records, the answers.
+        ask: what is wanted.
+    """
+
+    arm: ArmTables
+    S: Shapes
+    pairs: Pairs
+    zones: Records
+    path: Path
+    k: Records
+    doubt: Records
+    found: Records
+    ask: Ask
+
+
 @inlined
-def _look(
-    arm: ArmTables,
-    S: Shapes,
-    pairs: Pairs,
-    zones: Records,
-    path: Path,
-    k: Records,
-    doubt: Records,
-    found: Records,
-    ask: Ask,
-    p: int,
-) -> None:
+def _group(task: Task, p: int) -> int:
+    """The group of a pair: its zone, or the one of all zones together."""
+    return 0 if task.ask.together == 1 else task.pairs.row[p].zone
+
+
+@inlined
+def _look(task: Task, p: int) -> None:
     """Coarse bounds of one pair: it goes on the list, or only lowers the bounds of its group."""
+    arm, S, pairs, zones, path, k, doubt, found, ask = task
     cells = k.cells
     h = path.end[0] / cells
     middle = cells // 2
     pair = pairs.row[p]
     z = pair.zone
-    g = 0 if ask.together == 1 else z
+    g = _group(task, p)
     margin = zones[z].margin
     link = pair.link
     radius = arm.link[link].capsule[6]
@@ -140,21 +157,12 @@ def _pass_over(found: Records, g: int, p: int, least: float, start: float) -> No
 
 
 @inlined
-def _coarse(
-    arm: ArmTables,
-    S: Shapes,
-    pairs: Pairs,
-    zones: Records,
-    path: Path,
-    k: Records,
-    doubt: Records,
-    found: Records,
-    ask: Ask,
-) -> None:
+def _coarse(task: Task) -> None:
     """Fill in ``doubt``.
 
     If only the worst zone is wanted, zones that stand still are found through their tree.
     """
+    arm, _, pairs, zones, path, k, doubt, found, ask = task
     cells = k.cells
     middle = cells // 2
     share = max(middle, cells - middle) * path.end[0] / cells
@@ -187,13 +195,13 @@ def _coarse(
                     top += 2
                 elif zones[node.zone].active == 1 and pairs.of[node.zone, link] >= 0:
                     p = pairs.of[node.zone, link]
-                    _look(arm, S, pairs, zones, path, k, doubt, found, ask, p)
+                    _look(task, p)
     count = len(pairs.loose) if treed else len(zones)
     for i in range(count):
         z = pairs.loose[i] if treed else i
         if zones[z].active == 1:
             for p in range(zones[z].first, zones[z].last):
-                _look(arm, S, pairs, zones, path, k, doubt, found, ask, p)
+                _look(task, p)
     _sort(doubt, k.doubts)
 
 
@@ -225,30 +233,19 @@ def _link_center(
 
 
 @inlined
-def _walk_all(
-    arm: ArmTables,
-    S: Shapes,
-    pairs: Pairs,
-    zones: Records,
-    path: Path,
-    k: Records,
-    doubt: Records,
-    found: Records,
-    ask: Ask,
-    begin: float,
-    aim: tuple[float, float],
-) -> None:
+def _walk_all(task: Task, begin: float, aim: tuple[float, float]) -> None:
     """Walk every doubtful pair (of group ``k.only`` if it is not negative) from a fraction on.
 
     ``aim`` is that of `walk`.
     """
+    arm, S, pairs, zones, path, k, doubt, found, _ = task
     touch, slack = aim
     cells = k.cells
     h = path.end[0] / cells
     for i in range(k.doubts):
         d = doubt[i].order
         p = doubt[d].pair
-        g = 0 if ask.together == 1 else pairs.row[p].zone
+        g = _group(task, p)
         if (k.only >= 0 and g != k.only) or found[g].stop == 0.0:
             continue
         if slack < FAR and math.isnan(found[g].coarse):
@@ -283,24 +280,15 @@ def _walk_all(
 
 
 @inlined
-def _seed(
-    arm: ArmTables,
-    S: Shapes,
-    pairs: Pairs,
-    zones: Records,
-    path: Path,
-    k: Records,
-    doubt: Records,
-    found: Records,
-    ask: Ask,
-) -> None:
+def _seed(task: Task) -> None:
     """Meet small distances first: what is known not to be the least need not be walked sharply."""
+    arm, S, pairs, zones, path, k, doubt, found, ask = task
     cells = k.cells
     for i in range(k.doubts):
         d = doubt[i].order
         p = doubt[d].pair
         z = pairs.row[p].zone
-        g = 0 if ask.together == 1 else z
+        g = _group(task, p)
         if math.isnan(found[g].coarse):
             continue
         margin = zones[z].margin
@@ -318,27 +306,18 @@ def _seed(
 
 
 @inlined
-def _contained(
-    arm: ArmTables,
-    S: Shapes,
-    pairs: Pairs,
-    zones: Records,
-    path: Path,
-    k: Records,
-    doubt: Records,
-    found: Records,
-    ask: Ask,
-) -> None:
+def _contained(task: Task) -> None:
     """Contact at the start for a side that begins wholly inside the other.
 
     Surfaces show nothing of that; later on the way it cannot come about without a contact.
     """
+    arm, S, pairs, zones, path, k, doubt, found, _ = task
     for i in range(k.doubts):
         p = doubt[i].pair
         if pairs.row[p].hollow == 0 or doubt[i].start > 0.0:
             continue
         z = pairs.row[p].zone
-        g = 0 if ask.together == 1 else z
+        g = _group(task, p)
         place(arm, path.frames[0], pairs.row[p], zones[z].pose, k.pose_a[0], k.pose_b[0], k.pose)
         a, b = pairs.row[p].a, pairs.row[p].b
         for side in range(2):
@@ -356,33 +335,22 @@ def _contained(
                 lz = frame[0, 2] * ux + frame[1, 2] * uy + frame[2, 2] * uz
                 if inside(S, other, lx, ly, lz):
                     found[g].stop = 0.0
-                    found[g].hit[0], found.hit[g, 1], found.hit[g, 2] = p, a, b
+                    hit = found[g].hit
+                    hit[0], hit[1], hit[2] = p, a, b
                     out = found[g].point
                     out[0], out[1], out[2] = moved(path.frames[0, pairs.row[p].common], x, y, w)
 
 
 @inlined
-def _zone_distance(
-    arm: ArmTables,
-    S: Shapes,
-    pairs: Pairs,
-    zones: Records,
-    path: Path,
-    k: Records,
-    doubt: Records,
-    found: Records,
-    ask: Ask,
-    g: int,
-    s: float,
-    limits: tuple[float, float, float],
-) -> float:
+def _zone_distance(task: Task, g: int, s: float, limits: tuple[float, float, float]) -> float:
     """Least distance less margin of a group's doubtful pairs at a fraction; see `nearest`."""
+    arm, S, pairs, zones, path, k, doubt, found, _ = task
     known, slack, enough = limits
     for i in range(k.doubts):
         d = doubt[i].order
         p = doubt[d].pair
         z = pairs.row[p].zone
-        if (0 if ask.together == 1 else z) != g:
+        if _group(task, p) != g:
             continue
         if s == 0.0 and doubt[d].start >= known - slack:
             continue
@@ -409,23 +377,13 @@ def _zone_distance(
 
 
 @inlined
-def _start(
-    arm: ArmTables,
-    S: Shapes,
-    pairs: Pairs,
-    zones: Records,
-    path: Path,
-    k: Records,
-    doubt: Records,
-    found: Records,
-    ask: Ask,
-    g: int,
-) -> None:
+def _start(task: Task, g: int) -> None:
     """Clearance at the start and whether it is closing, of a group whose walks are done.
 
     Inside the margin it is closing if any side that is inside comes nearer, or touches and does
     not come off; outside, if the nearest one comes nearer.
     """
+    arm, S, pairs, zones, path, k, doubt, found, ask = task
     touched = found[g].stop == 0.0
     if touched or ask.sharp == 1:
         found[g].closing = 0
@@ -435,7 +393,7 @@ def _start(
         d = doubt[i].order
         p = doubt[d].pair
         z = pairs.row[p].zone
-        if (0 if ask.together == 1 else z) != g:
+        if _group(task, p) != g:
             continue
         if not touched and ask.sharp == 0:
             found[g].now = min(found[g].now, doubt[d].start)
@@ -472,8 +430,8 @@ def _start(
             found[g].closing = 1
     if touched:
         # where no surfaces are near, one side is inside the other
-        inside = -zones[pairs.row[found[g].hit[0]].zone].margin
-        found[g].now = least if least < FAR else inside
+        margin = zones[pairs.row[found[g].hit[0]].zone].margin
+        found[g].now = least if least < FAR else -margin
         return
     least -= EXACT * abs(least) + ROUNDING_M
     # that the start is clear is proven, by however little
@@ -482,19 +440,9 @@ def _start(
 
 
 @inlined
-def _refute(
-    arm: ArmTables,
-    S: Shapes,
-    pairs: Pairs,
-    zones: Records,
-    path: Path,
-    k: Records,
-    doubt: Records,
-    found: Records,
-    ask: Ask,
-    g: int,
-) -> bool:
+def _refute(task: Task, g: int) -> bool:
     """Look for group g's contact a little ahead; true if it is there, or can be no further."""
+    _, _, pairs, _, path, k, _, found, ask = task
     s = found[g].stop
     if s == np.inf or s == 0.0:
         return True
@@ -503,7 +451,7 @@ def _refute(
     ahead = min(s + (ask.tolerance / rate if rate > 0.0 else np.inf), path.end[0])
     kept = found[g].nearest
     limits = (ask.touch, 0.0, 0.0)  # nothing farther matters
-    there = _zone_distance(arm, S, pairs, zones, path, k, doubt, found, ask, g, ahead, limits)
+    there = _zone_distance(task, g, ahead, limits)
     found[g].nearest = kept
     if there <= 0.0:
         found[g].confirmed = ahead
@@ -511,18 +459,9 @@ def _refute(
 
 
 @compiled
-def search(
-    arm: ArmTables,
-    S: Shapes,
-    pairs: Pairs,
-    zones: Records,
-    path: Path,
-    k: Records,
-    doubt: Records,
-    found: Records,
-    ask: Ask,
-) -> None:
+def search(task: Task) -> None:
     """Sweep the path that is set in ``path`` against all active zones; fills ``found``."""
+    arm, S, pairs, _, path, k, _, found, ask = task
     groups = len(found)
     for g in range(groups):
         found[g].stop = np.inf
@@ -537,18 +476,18 @@ def search(
     k.again = ask.again
     k.cells = cells_of(arm, path)
     lay_path(arm, S, pairs, path, k.cells)
-    _coarse(arm, S, pairs, zones, path, k, doubt, found, ask)
-    _contained(arm, S, pairs, zones, path, k, doubt, found, ask)
+    _coarse(task)
+    _contained(task)
     g, rung, begin = 0, 0, 0.0
     k.only = -1
     slack = 10.0 * FAR
     while True:  # all groups at first; then again each whose contact was refuted
         aim = (ask.touch * LADDER[rung], slack)
-        _walk_all(arm, S, pairs, zones, path, k, doubt, found, ask, begin, aim)
+        _walk_all(task, begin, aim)
         if slack < FAR:
             break
         while g < groups:
-            settled = _refute(arm, S, pairs, zones, path, k, doubt, found, ask, g)
+            settled = _refute(task, g)
             if not settled and rung + 1 < len(LADDER):
                 break
             g, rung = g + 1, 0
@@ -562,7 +501,7 @@ def search(
                 if found[i].stop == np.inf and found[i].unproven == np.inf:
                     found[i].coarse = found[i].bound
                     found[i].bound = FAR
-            _seed(arm, S, pairs, zones, path, k, doubt, found, ask)
+            _seed(task)
             continue
         rung += 1
         k.only = g
@@ -576,4 +515,4 @@ def search(
                 found[g].bound = found[g].coarse
             found[g].bound = max(found[g].bound, found[g].coarse)
         if ask.sharp == 1 or found[g].bound < FAR or found[g].stop == 0.0:
-            _start(arm, S, pairs, zones, path, k, doubt, found, ask, g)
+            _start(task, g)

@@ -20,7 +20,7 @@ import numpy as np
 from rampe_guard.core.arm_motion import PROBE_MOTION_M, valid_end
 from rampe_guard.core.bounding_tree import NONE
 from rampe_guard.core.scene import ActuatorLimit
-from rampe_guard.core.search_kernel import FAR, Ask, search
+from rampe_guard.core.search_kernel import FAR, Ask, Task, search
 from rampe_guard.core.sweep_box import AnyWay
 from rampe_guard.core.sweep_limit import sweep_limit
 from rampe_guard.core.sweep_problem import Zone
@@ -153,7 +153,7 @@ class Sweep:
             path.way[1], path.end[0] = 0.0, 1.0
         arm = problem.arm
         fastest = float((np.abs(displacement)[arm.actuator] @ arm.coefficients).max(initial=0.0))
-        search(
+        task = Task(
             problem.tables,
             problem.shapes,
             problem.pairs,
@@ -173,6 +173,7 @@ class Sweep:
                 again=self._near_last(start),
             ),
         )
+        search(task)
         return found
 
     def _near_last(self, start: FloatArray) -> int:

@@ -26,7 +26,7 @@ import numpy as np
 
 from rampe_guard.core.bounding_tree import HALFSPACE
 from rampe_guard.core.compiled import inlined
-from rampe_guard.core.gjk import distance, gap
+from rampe_guard.core.gjk import ROUNDING_M, distance, gap
 from rampe_guard.core.kernel_data import STACK, ArmTables, Pairs, Path, Records, Shapes
 from rampe_guard.core.path_kernel import (
     move_to,
@@ -80,7 +80,7 @@ def ball_gap(S: Shapes, a: int, pose_a: FloatArray, b: int, pose_b: FloatArray) 
     ax, ay, az = moved(pose_a, p[0], p[1], p[2])
     bx, by, bz = moved(pose_b, q[0], q[1], q[2])
     x, y, z = bx - ax, by - ay, bz - az
-    return float(math.sqrt(x * x + y * y + z * z) - p[3] - q[3] - 1e-9)
+    return float(math.sqrt(x * x + y * y + z * z) - p[3] - q[3] - ROUNDING_M)
 
 
 @inlined
@@ -164,7 +164,7 @@ def nearest(
         frames: of the arm at that posture.
         still: pose of the zone.
         p: pair.
-        k: scratch; ``k.point`` gets the nearest points in the pair's frame.
+        k: scratch.
         limits: (known, slack, enough): nothing farther than ``known`` is of interest, and the
             search ends at ``enough``.
 
@@ -203,11 +203,6 @@ def nearest(
         upper = max(upper - rounding, 0.0)
         if upper < known:
             known = upper
-            ra, rb = radius_of(S, a), radius_of(S, b)
-            for i in range(3):
-                side = nx if i == 0 else (ny if i == 1 else nz)
-                k.point[0, i] = k.work[13, i] + ra * side
-                k.point[1, i] = k.work[12, i] - rb * side
             if known <= enough:
                 break
     return known
