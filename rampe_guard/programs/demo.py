@@ -58,7 +58,7 @@ def demo(cycles: int, seed: int, console: Console, stop: StopFlag) -> int:
         start = stack.enter_context(_children(state))
         router = start("router", ["-m", "rampe_guard.runtime.router", endpoint])
         guard = start("guard", ["-m", "rampe_guard", "run", site_path, "--connect", endpoint])
-        # the operator waits for a listener before he begins to work
+        # the operator waits for the guard before he begins to work
         work = ["-m", "rampe_guard.simulate.process", "--connect", endpoint]
         operator = start("operator", [*work, "--cycles", str(cycles), "--seed", str(seed)])
         console.print("router, guard and operator are starting; the quarry is being loaded …")

@@ -13,6 +13,7 @@ from rampe_guard.runtime.zenoh_io import Bus
 from rampe_guard.settings import Site
 
 _PATIENCE_S = 10.0
+_LOOK_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +31,7 @@ class Player:
     """Publishes frames in real time, the joystick before the actuators that it moved."""
 
     def __init__(self, bus: Bus, site: Site) -> None:
+        self._bus, self._alive_key = bus, f"{site.keys.base}/alive"
         self._joystick = bus.outbox(site.keys.joystick)
         self._actuators = bus.outbox(site.keys.actuators)
 
@@ -40,6 +42,19 @@ class Player:
             if self._joystick.heard and self._actuators.heard:
                 return True
         return False
+
+    def wait_for_guard(self, stop: StopFlag) -> bool:
+        """Wait until the guard of the site says that it is there, however long it takes to load.
+
+        Others may listen long before: a screen, or a recorder.
+
+        Returns:
+            Whether it did; false if told to stop.
+        """
+        while not self._bus.is_alive(self._alive_key):
+            if stop.wait(_LOOK_S):
+                return False
+        return True
 
     def play(self, frames: Iterable[Frame], stop: StopFlag, speed: float = 1.0) -> int:
         """Send every frame at its time, ``speed`` times as fast; returns how many were sent."""

@@ -65,8 +65,8 @@ def main() -> int:
             return 0
         with bus:
             player = Player(bus, site)
-            player.wait_for_listener(stop)
-            player.play(_chain(first, work), stop)
+            if player.wait_for_guard(stop):
+                player.play(_chain(first, work), stop)
             print("done", flush=True)  # noqa: T201 - whoever started this waits for it
     except RampeGuardError as error:
         print(error, file=sys.stderr)  # noqa: T201
