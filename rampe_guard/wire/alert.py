@@ -33,7 +33,11 @@ class Alert(Message, frozen=True, kw_only=True):
         Meta(description="Life cycle by ISA-18.2; rtn_unacked: cause gone, not yet seen."),
     ]
     inhibit: Annotated[
-        Literal["none", "shelved"], Meta(description="Whether it is shelved for a time.")
+        Literal["none", "shelved", "machine_off"],
+        Meta(
+            description="Why nobody is to be troubled with it. shelved: silent for a time; "
+            "machine_off: the machine is switched off, and nothing is watched."
+        ),
     ]
     quality: Annotated[
         Literal["good", "degraded", "stale"],
@@ -76,6 +80,12 @@ class Alert(Message, frozen=True, kw_only=True):
         float | None, Meta(description="Unix time of its last change of level or state [s].")
     ]
     acked_by: Annotated[str | None, Meta(description="Who acknowledged it.")]
+    shelved_by: Annotated[
+        str | None, Meta(description="Who shelved it; null unless it is shelved.")
+    ] = None
+    shelved_until_unix_s: Annotated[
+        float | None, Meta(description="Unix time at which it will ask again [s]; null as above.")
+    ] = None
     expires_after_s: Annotated[
         float, Meta(description="Age at which it must no longer be trusted [s].")
     ]
