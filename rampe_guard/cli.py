@@ -142,14 +142,17 @@ def _model(args: argparse.Namespace) -> int:
 def _schema(args: argparse.Namespace) -> int:
     from rampe_guard.settings import scene_schema, site_schema
     from rampe_guard.wire import json_schemas
+    from rampe_guard.wire.asyncapi import asyncapi_text
 
     schemas = {"site": site_schema(), "scene": scene_schema(), **json_schemas()}
     if args.name is None:
         print(json.dumps(schemas, indent=2))
+    elif args.name == "asyncapi":
+        print(asyncapi_text(), end="")
     elif args.name in schemas:
         print(json.dumps(schemas[args.name], indent=2))
     else:
-        raise RampeGuardError(f"no schema {args.name!r}; there are {', '.join(schemas)}")
+        raise RampeGuardError(f"no schema {args.name!r}; there are {', '.join(schemas)}, asyncapi")
     return 0
 
 
@@ -220,8 +223,10 @@ def _parser() -> argparse.ArgumentParser:
     model = commands.add_parser("model", help="what is kept of an operator's way of working")
     _model_actions(model)
 
-    schema = commands.add_parser("schema", help="JSON Schemas of messages and files")
-    schema.add_argument("name", nargs="?", help="one of them, such as rampe.alert.v1")
+    schema = commands.add_parser("schema", help="JSON Schemas of messages and files, AsyncAPI")
+    schema.add_argument(
+        "name", nargs="?", help="one of them, such as rampe.alert.v1, or asyncapi: keys and QoS"
+    )
     schema.set_defaults(command=_schema)
 
     ack = commands.add_parser("ack", help="acknowledge an alert")
