@@ -162,6 +162,12 @@ def _ack(args: argparse.Namespace) -> int:
     return acknowledge(args.site, args.connect, args.alert, args.who)
 
 
+def _shelve(args: argparse.Namespace) -> int:
+    from rampe_guard.programs.watching import shelve
+
+    return shelve(args.site, args.connect, args.alert, args.who, vars(args)["for"])
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="rampe-guard",
@@ -229,11 +235,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     schema.set_defaults(command=_schema)
 
-    ack = commands.add_parser("ack", help="acknowledge an alert")
-    _site(ack, connect=True)
-    ack.add_argument("alert", help="its alert_id")
-    ack.add_argument("--who", required=True, help="who has seen it")
-    ack.set_defaults(command=_ack)
+    _alert_requests(
+        commands.add_parser("ack", help="acknowledge an alert"),
+        commands.add_parser("shelve", help="silence an alert for a short while"),
+    )
     return parser
 
 
@@ -264,9 +269,27 @@ def _site(parser: argparse.ArgumentParser, *, connect: bool = False) -> None:
         )
 
 
+def _alert_requests(ack: argparse.ArgumentParser, shelve: argparse.ArgumentParser) -> None:
+    for parser, who in ((ack, "who has seen it"), (shelve, "who wants it silent")):
+        _site(parser, connect=True)
+        parser.add_argument("alert", help="its alert_id")
+        parser.add_argument("--who", required=True, help=who)
+    ack.set_defaults(command=_ack)
+    text = "for how long; 0 ends its silence"
+    shelve.add_argument("--for", type=_seconds, required=True, metavar="SECONDS", help=text)
+    shelve.set_defaults(command=_shelve)
+
+
 def _operator(parser: argparse.ArgumentParser) -> None:
     text = "who is at the levers, instead of whom the site file names"
     parser.add_argument("--operator", metavar="NAME", help=text)
+
+
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not 0.0 <= value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not 0 or above")
+    return value
 
 
 def _positive(text: str) -> float:

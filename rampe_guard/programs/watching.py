@@ -1,4 +1,4 @@
-"""Commands of people who watch: ``watch`` and ``ack``."""
+"""Commands of people who watch: ``watch``, ``ack`` and ``shelve``."""
 
 from __future__ import annotations
 
@@ -43,4 +43,20 @@ def acknowledge(site_path: str, endpoints: Sequence[str], alert_id: str, who: st
         ack = wire.Ack(alert_id=alert_id, who=who or getpass.getuser())
         if not bus.ask(f"{site.keys.base}/ack", wire.encode(ack)):
             raise ConnectionFailedError(f"no guard answers on {site.keys.base}/ack")
+    return 0
+
+
+def shelve(
+    site_path: str, endpoints: Sequence[str], alert_id: str, who: str | None, duration_s: float
+) -> int:
+    """Ask the guard to keep an alert silent for a while [s]; 0 ends its silence.
+
+    Raises:
+        ConnectionFailedError: no router, no guard, or the guard refuses (with its reason).
+    """
+    site = connect_to(load_site(site_path), endpoints)
+    with Bus.open(site.zenoh) as bus:
+        wish = wire.Shelve(alert_id=alert_id, who=who or getpass.getuser(), duration_s=duration_s)
+        if not bus.ask(f"{site.keys.base}/shelve", wire.encode(wish)):
+            raise ConnectionFailedError(f"no guard answers on {site.keys.base}/shelve")
     return 0

@@ -35,6 +35,8 @@ def _keys(model: SiteModel, problems: Problems) -> None:
         (("keys", "actuators"), model.keys.actuators),
         (("keys", "base"), model.keys.base),
     ]
+    if model.keys.enabled is not None:
+        keys.append((("keys", "enabled"), model.keys.enabled))
     alive: KeyPath = ("inputs", "joystick", "alive_key")
     if model.inputs.joystick.alive_key is not None:
         keys.append((alive, model.inputs.joystick.alive_key))
@@ -57,8 +59,9 @@ def _keys(model: SiteModel, problems: Problems) -> None:
 def used_keys(model: SiteModel) -> dict[str, str]:
     """Every key that means something at a site, and what."""
     used = {f"{model.keys.base}/{word}": "a key of the guard itself" for word in PUBLISHED}
-    for name in ("joystick", "actuators", "base"):
-        used[getattr(model.keys, name)] = f"keys.{name}"
+    for name in ("joystick", "actuators", "base", "enabled"):
+        if (key := getattr(model.keys, name)) is not None:
+            used[key] = f"keys.{name}"
     if model.inputs.joystick.alive_key is not None:
         used[model.inputs.joystick.alive_key] = "inputs.joystick.alive_key"
     return used

@@ -6,7 +6,7 @@ site's units.
 """
 
 from rampe_guard.wire.ack import Ack
-from rampe_guard.wire.alert import Alert
+from rampe_guard.wire.alert import Alert, by_urgency
 from rampe_guard.wire.codec import MAX_PAYLOAD_BYTES, decode, encode
 from rampe_guard.wire.health import (
     CanaryTrial,
@@ -58,6 +58,7 @@ __all__ = [
     "SweepReply",
     "SweepRequest",
     "alert_text",
+    "by_urgency",
     "decode",
     "decode_actuators",
     "decode_enabled",

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Annotated, Final, Literal
 
 from msgspec import Meta
 
+from rampe_guard.core.alarm import Level, urgency
 from rampe_guard.wire import fields as f
 from rampe_guard.wire.codec import Message
 
@@ -93,3 +95,16 @@ class Alert(Message, frozen=True, kw_only=True):
         str,
         Meta(description="For a cab display.", extra_json_schema={"maxLength": 60}),
     ]
+
+
+def by_urgency(alerts: Iterable[Alert]) -> tuple[Alert, ...]:
+    """The gravest first, then the soonest, then by name: the order of every list of alerts."""
+    return tuple(
+        sorted(
+            alerts,
+            key=lambda a: (
+                *urgency(Level[a.level.upper()], a.time_to_collision_s),
+                a.zone or "",
+            ),
+        )
+    )

@@ -54,7 +54,7 @@ def test_an_alert_lives_at_least_its_minimum() -> None:
 def test_a_rise_asks_for_attention_again() -> None:
     alarm = Alarm(CONFIG)
     run(alarm, [W, W])
-    assert alarm.acknowledge("ann", 0.2)
+    assert alarm.acknowledge("ann")
     assert (alarm.state, alarm.acked_by) == (State.ACKED, "ann")
     assert alarm.step(I, 0.3)
     assert (alarm.state, alarm.acked_by) == (State.UNACKED, None)
@@ -73,7 +73,7 @@ def test_a_latched_alarm_waits_for_someone() -> None:
     alarm = Alarm(CONFIG, latched=True)
     run(alarm, [I] + [O] * 20)
     assert (alarm.level, alarm.state, alarm.active) == (O, State.RTN_UNACKED, True)
-    assert alarm.acknowledge("bob", 5.0)
+    assert alarm.acknowledge("bob")
     assert alarm.state is State.NORMAL
 
 
@@ -84,7 +84,7 @@ def test_a_latched_alarm_can_rise_again() -> None:
 
 
 def test_nothing_to_acknowledge() -> None:
-    assert not Alarm(CONFIG).acknowledge("ann", 0.0)
+    assert not Alarm(CONFIG).acknowledge("ann")
 
 
 def test_the_table_reaches_every_state() -> None:
