@@ -131,6 +131,14 @@ def on_state(fleet: Fleet, base: str, message: wire.State, now_s: float, asked_s
     return _put(fleet, replace(machine, behind=left), items)
 
 
+def on_unreadable(fleet: Fleet, base: str, now_s: float) -> Told:
+    """A message of ``{base}/alert`` cannot be read: something is raised, nobody knows what."""
+    machine = _machine(fleet, base, now_s)
+    if machine is None:
+        return fleet, ()
+    return _put(fleet, replace(machine, unreadable_s=now_s), [])
+
+
 def on_token(fleet: Fleet, base: str, now_s: float, *, alive: bool) -> Told:
     """The liveliness token of a guard appeared or went."""
     if base not in fleet.machines and not alive:

@@ -45,6 +45,7 @@ class MachineState:
         heartbeat_s: when the newest came [s].
         gone: the guard's liveliness token went, and no heartbeat came since.
         alerts: every alert that is not over, shelved and expired ones too; the gravest first.
+        unreadable_s: when an alert came that could not be read [s]; None: never.
         lost: messages that did not arrive, so far.
         behind: something may be missing here: ask for the guard's `state`.
         memory: to know what is new.
@@ -61,6 +62,7 @@ class MachineState:
     heartbeat_s: float | None = None
     gone: bool = False
     alerts: tuple[Alert, ...] = ()
+    unreadable_s: float | None = None
     lost: int = 0
     behind: bool = True
     memory: Memory = field(default_factory=Memory)
@@ -79,7 +81,7 @@ class MachineState:
         if status is None:
             off = [reason.code for reason in self.heartbeat.reasons] == ["machine_off"]
             return Protection.MACHINE_OFF if off else Protection.NOT_MONITORING
-        if any(self.expired(alert) for alert in self.alerts):
+        if self._blind or any(self.expired(alert) for alert in self.alerts):
             return Protection.UNAVAILABLE
         return status
 
@@ -92,8 +94,10 @@ class MachineState:
             return ("the guard is gone",)
         if self.silent:
             return (f"no heartbeat for {self.silence_s:.1f} s",)
-        expired = [a.zone or "system" for a in self.alerts if self.expired(a)]
         if self.protection is Protection.UNAVAILABLE:
+            if self._blind:
+                return ("an alert cannot be read: another version of rampe-guard?",)
+            expired = [a.zone or "system" for a in self.alerts if self.expired(a)]
             return tuple(f"the alert of {zone} is not repeated" for zone in expired)
         return tuple(reason.text for reason in self.heartbeat.reasons)
 
@@ -110,6 +114,13 @@ class MachineState:
     def expired(self, alert: Alert) -> bool:
         """It was not repeated in time: still shown, no longer to be trusted."""
         return self.now_s - alert.received_s > alert.expires_after_s
+
+    @property
+    def _blind(self) -> bool:
+        """An alert is active that is not among ours."""
+        if self.unreadable_s is None:
+            return False
+        return self.now_s - self.unreadable_s <= self.expires_after_s
 
     @property
     def silent(self) -> bool:

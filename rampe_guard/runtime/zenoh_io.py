@@ -79,6 +79,49 @@ class Liveness:
         return self.alive
 
 
+class Tokens:
+    """Liveliness tokens that appear and go on a key expression; those that exist come first."""
+
+    def __init__(self, session: zenoh.Session, key: str) -> None:
+        self._subscriber = session.liveliness().declare_subscriber(
+            key, zenoh.handlers.RingChannel(4096), history=True
+        )
+
+    def drain(self) -> list[tuple[str, bool]]:
+        """Keys of tokens, and whether each appeared; oldest first; never blocks."""
+        changes = []
+        while (sample := self._subscriber.try_recv()) is not None:
+            changes.append((str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT))
+        return changes
+
+
+class Inquiry:
+    """A question to everyone whose queryable matches a key expression, answered bit by bit."""
+
+    def __init__(self, session: zenoh.Session, key: str, timeout_s: float) -> None:
+        self._replies = session.get(
+            key,
+            zenoh.handlers.RingChannel(4096),
+            target=zenoh.QueryTarget.ALL,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            timeout=timeout_s,
+        )
+        self.done = False
+        """All have answered, or the time is over."""
+
+    def drain(self) -> list[Message]:
+        """Answers that arrived since the last look; errors are left out; never blocks."""
+        answers = []
+        try:
+            while (reply := self._replies.try_recv()) is not None:
+                if reply.ok is not None:
+                    key = str(reply.ok.key_expr)
+                    answers.append(Message(key, reply.ok.payload.to_bytes()))
+        except zenoh.ZError:  # the channel is empty, and closed
+            self.done = True
+        return answers
+
+
 class Outbox:
     """A publisher on one key; ``put`` never waits for a slow subscriber."""
 
@@ -204,6 +247,14 @@ class Bus:
         """Watch the liveliness token on a key."""
         return Liveness(self._session, key)
 
+    def tokens(self, key: str) -> Tokens:
+        """Watch all liveliness tokens on a key expression."""
+        return Tokens(self._session, key)
+
+    def inquire(self, key: str, timeout_s: float = 1.0) -> Inquiry:
+        """Query everyone on a key expression, without waiting."""
+        return Inquiry(self._session, key, timeout_s)
+
     def is_alive(self, key: str) -> bool:
         """Whether anybody holds a liveliness token on a key now."""
         replies = self._session.liveliness().get(key, timeout=1.0)
@@ -217,10 +268,15 @@ class Bus:
         """Query a key; returns the answers.
 
         Raises:
-            ConnectionFailedError: the answer was an error (its text is in the message).
+            ConnectionFailedError: the answer was an error (its text is in the message), or the
+                session is closed.
         """
         answers = []
-        for reply in self._session.get(key, payload=payload, timeout=timeout_s):
+        try:
+            replies = self._session.get(key, payload=payload, timeout=timeout_s)
+        except zenoh.ZError as error:  # closed by another thread, say
+            raise ConnectionFailedError(f"{key}: {str(error).split(' at /')[0]}") from None
+        for reply in replies:
             if reply.ok is not None:
                 answers.append(reply.ok.payload.to_bytes())
             elif (
@@ -272,6 +328,19 @@ def check_configuration(settings: ZenohSettings) -> None:
         SettingsError: it could not.
     """
     _config(settings)
+
+
+def check_key_expression(text: str) -> None:
+    """See whether Zenoh takes it for a key expression.
+
+    Raises:
+        SettingsError: it does not.
+    """
+    try:
+        zenoh.KeyExpr(text)
+    except zenoh.ZError as error:
+        reason = str(error).split(" at /")[0].splitlines()[0]
+        raise SettingsError(f"{text!r} is no key expression: {reason}") from None
 
 
 def _config(settings: ZenohSettings) -> zenoh.Config:

@@ -232,6 +232,19 @@ def test_an_alert_that_is_not_repeated_takes_protection_away(ear: Listener) -> N
     assert kinds(ear.told()) == ["ProtectionBack"]
 
 
+def test_an_alert_that_cannot_be_read_takes_protection_away(ear: Listener) -> None:
+    ear._keep(core.on_unreadable(ear.fleet, BASE, ear.now_s))
+    ear.beat(2)
+    (lost,) = ear.told()
+    assert isinstance(lost, ProtectionLost)
+    assert lost.text.startswith("PROTECTION UNAVAILABLE: an alert cannot be read")
+    ear.wait(0.9)
+    ear.beat(3)
+    assert ear.told() == []
+    ear.wait(0.2)
+    assert kinds(ear.told()) == ["ProtectionBack"]
+
+
 def test_gaps_of_seq_are_counted_and_the_state_is_wanted(ear: Listener) -> None:
     ear.alert(5)
     assert kinds(ear.told()) == ["Alert"]  # nobody knows what went before
@@ -266,7 +279,7 @@ def test_a_lost_clear_is_learned_from_the_state_of_a_guard_that_monitors(ear: Li
     (clear,) = ear.told()
     assert isinstance(clear, Alert)
     assert (clear.level, clear.state, clear.inferred) == ("clear", "normal", True)
-    assert clear.text == "wall clear"
+    assert "clear" in clear.text
     assert not ear.machine.behind
     ear.alert(2, level="clear", state="normal")  # the clear was only late
     assert ear.told() == []
@@ -358,6 +371,7 @@ def test_machines_are_bounded() -> None:
     assert core.on_state(fleet, "b", STATE, 1.0, 1.0) == (fleet, ())
     assert core.on_token(fleet, "b", 1.0, alive=True) == (fleet, ())
     assert core.expect(fleet, "b", 1.0) == (fleet, ())
+    assert core.on_unreadable(fleet, "b", 1.0) == (fleet, ())
 
 
 def test_items_are_json_lines_that_name_their_event(ear: Listener) -> None:
