@@ -35,6 +35,7 @@ from rampe_guard.client.items import (
     ended,
 )
 from rampe_guard.client.machine import STATUS, MachineState
+from rampe_guard.core.alarm import urgency
 
 MAX_MACHINES = 1000
 """A key expression that matches more is a mistake, or an attack on our memory."""
@@ -266,10 +267,8 @@ def _unchanged_s(alert: Alert) -> float:
     return alert.published_unix_s - (alert.changed_unix_s or alert.published_unix_s)
 
 
-def _gravest_first(alert: Alert) -> tuple[int, float, float]:
-    time_s = alert.time_to_collision_s
-    soon_s = float("inf") if time_s is None else time_s
-    return -alert.urgency, soon_s, alert.raised_unix_s or 0.0
+def _gravest_first(alert: Alert) -> tuple[int, float, str]:
+    return *urgency(alert.urgency, alert.time_to_collision_s), alert.zone or ""
 
 
 def _tell(machine: MachineState) -> tuple[MachineState, tuple[Item, ...]]:

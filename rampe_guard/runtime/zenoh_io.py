@@ -99,9 +99,10 @@ class Inquiry:
     """A question to everyone whose queryable matches a key expression, answered bit by bit."""
 
     def __init__(self, session: zenoh.Session, key: str, timeout_s: float) -> None:
+        # no ring: that forgets what waits in it as soon as the last answer has come
         self._replies = session.get(
             key,
-            zenoh.handlers.RingChannel(4096),
+            zenoh.handlers.FifoChannel(4096),
             target=zenoh.QueryTarget.ALL,
             consolidation=zenoh.ConsolidationMode.NONE,
             timeout=timeout_s,
