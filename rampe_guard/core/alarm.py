@@ -176,7 +176,7 @@ class Alarm:
         if self.level is Level.CLEAR:
             self._fire(Trigger.EVIDENCE if evidence else Trigger.LOST)
             return False
-        return self._calm(now_s) or self._again(now_s)
+        return self._calm(now_s) or (evidence > Level.CLEAR and self._again(now_s))
 
     def acknowledge(self, who: str) -> bool:
         """Someone has seen it; False if there was nothing to acknowledge."""
