@@ -96,6 +96,18 @@ def _watch(args: argparse.Namespace) -> int:
     return watch_site(args.site, args.connect, Console(), StopFlag.on_signals())
 
 
+def _dashboard(args: argparse.Namespace) -> int:
+    from rampe_guard.runtime.stopping import StopFlag
+
+    stop = StopFlag.on_signals()  # before the imports, which take a while
+    from rampe_guard.programs.dashboarding import dashboard_sites
+
+    def say(text: str) -> None:
+        print(text, flush=True)
+
+    return dashboard_sites(args.site, args.connect, args.host, args.port, say, stop)
+
+
 def _replay(args: argparse.Namespace) -> int:
     from rampe_guard.programs.replaying import replay_live, replay_offline
     from rampe_guard.runtime.stopping import StopFlag
@@ -204,6 +216,8 @@ def _parser() -> argparse.ArgumentParser:
     _site(watch, connect=True)
     watch.set_defaults(command=_watch)
 
+    _dashboard_options(commands.add_parser("dashboard", help="machines in the browser, in 3D"))
+
     replay = commands.add_parser("replay", help="a CSV log through the guard")
     _site(replay, connect=True)
     replay.add_argument("log", help="CSV file; columns as the site file's 'log' says")
@@ -260,13 +274,25 @@ def _model_actions(model: argparse.ArgumentParser) -> None:
 def _site(parser: argparse.ArgumentParser, *, connect: bool = False) -> None:
     parser.add_argument("site", help="site file (YAML)")
     if connect:
-        parser.add_argument(
-            "--connect",
-            action="append",
-            default=[],
-            metavar="ENDPOINT",
-            help="Zenoh endpoint instead of the site file's, such as tcp/127.0.0.1:7447",
-        )
+        _connect(parser)
+
+
+def _dashboard_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("site", nargs="+", help="site files (YAML), one per machine")
+    _connect(parser)
+    parser.add_argument("--host", default="127.0.0.1", help="to listen on (default 127.0.0.1)")
+    parser.add_argument("--port", type=_port, default=8080, help="0: any free (default 8080)")
+    parser.set_defaults(command=_dashboard)
+
+
+def _connect(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--connect",
+        action="append",
+        default=[],
+        metavar="ENDPOINT",
+        help="Zenoh endpoint instead of the site file's, such as tcp/127.0.0.1:7447",
+    )
 
 
 def _alert_requests(ack: argparse.ArgumentParser, shelve: argparse.ArgumentParser) -> None:
@@ -296,6 +322,13 @@ def _positive(text: str) -> float:
     value = float(text)
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is not above 0")
+    return value
+
+
+def _port(text: str) -> int:
+    value = int(text)
+    if not 0 <= value <= 65535:  # noqa: PLR2004 - what TCP has
+        raise argparse.ArgumentTypeError(f"{value} is no port")
     return value
 
 
