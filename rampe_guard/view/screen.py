@@ -48,12 +48,12 @@ def render(state: ViewState, width: int = 80, height: int = 24) -> RenderableTyp
     rows = len(head) + len(state.actuators) + max(1, len(state.alerts)) + spare + _FIXED_ROWS
     return Group(
         *head,
-        _title("actuators", _basis(state), width),
+        title("actuators", _basis(state), width),
         _actuators(state, width),
-        _title("alerts", "", width),
+        title("alerts", "", width),
         _alerts(state, width),
         *[Text("")] * spare,
-        _title("events", "", width),
+        title("events", "", width),
         _events(state, max(1, height - rows)),
         Text(""),
         _footer(state, width),
@@ -92,8 +92,7 @@ def _banner(state: ViewState, width: int) -> list[Text]:
         state.why,
         "Collision warnings will not come. Work as if there were none.",
     ]
-    seen = any(a.source == "system" and not a.attention for a in state.alerts)
-    turned = not seen and not lit(LOST_HZ, state.now_s)
+    turned = not state.seen and not lit(LOST_HZ, state.now_s)
     return [hatched(line, width, turned=turned) for line in lines]
 
 
@@ -177,7 +176,8 @@ def _footer(state: ViewState, width: int) -> Text:
     return line
 
 
-def _title(name: str, remark: str, width: int) -> Text:
+def title(name: str, remark: str, width: int) -> Text:
+    """A rule with a name, and a remark at its end."""
     rule = "─" * max(0, width - len(name) - len(remark) - 5 - bool(remark))
     return Text(f"── {name} {rule}{' ' if remark else ''}{remark}", DIM)
 

@@ -212,6 +212,13 @@ class ViewState:
         return f"no message from the guard for {self.silence_s:.1f} s"
 
     @property
+    def seen(self) -> bool:
+        """Somebody has acknowledged that it does not monitor; for a silent guard nobody can."""
+        if self.protection is not Protection.NOT_MONITORING:
+            return False
+        return any(a.source == "system" and not a.attention for a in self.alerts)
+
+    @property
     def position_stale(self) -> bool:
         """Positions are missing or too old to be shown as present."""
         return self._too_old(self.position_received_s)

@@ -1,4 +1,4 @@
-"""The contract as one AsyncAPI 3 document, and the folder that holds all of it.
+"""The contract as one AsyncAPI 3 document.
 
 Payloads are references to the JSON Schemas, which lie beside the document under the names of
 the messages. AsyncAPI knows no binding for Zenoh: what it has to say stands in ``x-zenoh``.
@@ -7,9 +7,7 @@ the messages. AsyncAPI knows no binding for Zenoh: what it has to say stands in 
 from __future__ import annotations
 
 import io
-import json
 import re
-from pathlib import Path
 from typing import Any, Final
 
 from ruamel.yaml import YAML
@@ -20,7 +18,6 @@ from rampe_guard.wire.schema import json_schemas
 
 CONTRACT_VERSION: Final = "1.0.0"
 """Grows in the middle with every addition; the first number is the ``v1`` of the messages."""
-FILE: Final = "asyncapi.yaml"
 _SCHEMA_FORMAT = "application/schema+json;version=2020-12"
 _RULES = """\
 The guard is the application: it `receive`s inputs and queries, and `send`s the rest.
@@ -78,26 +75,6 @@ def asyncapi_text() -> str:
     out = io.StringIO()
     yaml.dump(_literal(asyncapi()), out)
     return out.getvalue()
-
-
-def contract_files() -> dict[str, str]:
-    """Every file of the contract: its text by its name."""
-    files = {
-        schema_file(name): json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
-        for name, schema in json_schemas().items()
-    }
-    return files | {FILE: asyncapi_text()}
-
-
-def write_contract(folder: Path) -> None:
-    """Write the contract into ``folder``; schemas of messages that are no more go."""
-    folder.mkdir(parents=True, exist_ok=True)
-    files = contract_files()
-    for old in folder.glob("*.schema.json"):
-        if old.name not in files:
-            old.unlink()
-    for name, text in files.items():
-        (folder / name).write_text(text, encoding="utf-8")
 
 
 def schema_file(message: str) -> str:

@@ -12,8 +12,7 @@ import jsonschema  # type: ignore[import-untyped]
 import pytest
 from ruamel.yaml import YAML
 
-from rampe_guard.wire import json_schemas
-from rampe_guard.wire.asyncapi import FILE, contract_files, write_contract
+from rampe_guard.programs.contract import contract_files, message_schemas, write_contract
 from rampe_guard.wire.channels import KEYS, PARAMETERS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -29,7 +28,7 @@ BY_ACTUATOR = {
 DIMENSIONLESS = {
     "axes", "category", "borrowed_from", "quaternion_xyzw", "dof",
     "probability", "share", "contact_fraction",
-    "seq", "tick", "observations", "accepted", "rejected", "primitives", "drops",
+    "seq", "tick", "observations", "accepted", "rejected", "primitives", "drops", "count",
 }  # fmt: skip
 SECONDS = {"stamp"}
 """Named by the design, before the rule."""
@@ -39,8 +38,8 @@ Field = tuple[str, str, dict[str, Any]]
 
 def parts(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
     """The message and each struct inside it, by name."""
-    yield "", schema
-    yield from schema.get("$defs", {}).items()
+    yield "", {"properties": {}, **schema}
+    yield from ((n, p) for n, p in schema.get("$defs", {}).items() if "properties" in p)
 
 
 def fields(schema: dict[str, Any]) -> Iterator[Field]:
@@ -73,7 +72,7 @@ def enclosing(schema: dict[str, Any], struct: str) -> set[str]:
 
 def test_the_files_are_current() -> None:
     assert {p.name: p.read_text("utf-8") for p in FOLDER.iterdir()} == contract_files(), (
-        "run: python -m rampe_guard.wire config/contract"
+        "run: rampe-guard schema --out config/contract"
     )
 
 
@@ -84,9 +83,9 @@ def test_writing_takes_away_what_is_no_message_any_more(tmp_path: Path) -> None:
     assert {p.name for p in tmp_path.iterdir()} == {*contract_files(), "notes.txt"}
 
 
-@pytest.mark.parametrize("name", json_schemas())
+@pytest.mark.parametrize("name", message_schemas())
 def test_every_number_has_its_unit_in_its_name(name: str) -> None:
-    schema = json_schemas()[name]
+    schema = message_schemas()[name]
     for struct, field, said in fields(schema):
         if not is_number(said) or field in BY_ACTUATOR | DIMENSIONLESS | SECONDS:
             continue
@@ -103,9 +102,9 @@ def test_the_rule_of_units_can_fail() -> None:
     assert not is_number({"type": "array", "items": {"type": "string"}})
 
 
-@pytest.mark.parametrize("name", json_schemas())
+@pytest.mark.parametrize("name", message_schemas())
 def test_everything_is_described(name: str) -> None:
-    schema = json_schemas()[name]
+    schema = message_schemas()[name]
     assert [part for part, said in parts(schema) if not said.get("description")] == []
     missing = [f"{part}.{field}" for part, field, said in fields(schema) if not described(said)]
     assert missing == []
@@ -117,12 +116,12 @@ def described(said: dict[str, Any]) -> bool:
 
 
 def test_no_exception_is_kept_for_nothing() -> None:
-    every = {field for schema in json_schemas().values() for _, field, _ in fields(schema)}
+    every = {field for schema in message_schemas().values() for _, field, _ in fields(schema)}
     assert (BY_ACTUATOR | DIMENSIONLESS | SECONDS) - every == set()
 
 
 def document() -> dict[str, Any]:
-    loaded: dict[str, Any] = YAML(typ="safe").load((FOLDER / FILE).read_text("utf-8"))
+    loaded: dict[str, Any] = YAML(typ="safe").load((FOLDER / "asyncapi.yaml").read_text("utf-8"))
     return loaded
 
 
@@ -170,5 +169,5 @@ def test_every_parameter_of_an_address_is_explained() -> None:
 def test_every_message_is_on_a_key_or_a_line() -> None:
     """What is not on a Zenoh key is a line that a command reads or prints."""
     on_keys = {name for key in KEYS for name in (key.message, key.reply) if name}
-    on_lines = {"rampe.sweep_request.v1", "rampe.sweep_reply.v1"}
-    assert on_keys | on_lines == set(json_schemas())
+    on_lines = {"rampe.sweep_request.v1", "rampe.sweep_reply.v1", "rampe.watch_line.v1"}
+    assert on_keys | on_lines == set(message_schemas())
