@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import faulthandler
-import json
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -90,10 +89,13 @@ def _sweep(args: argparse.Namespace) -> int:
 def _watch(args: argparse.Namespace) -> int:
     from rich.console import Console
 
-    from rampe_guard.programs.watching import watch_site
+    from rampe_guard.programs.control_room import watch_sites
     from rampe_guard.runtime.stopping import StopFlag
 
-    return watch_site(args.site, args.connect, Console(), StopFlag.on_signals())
+    stop = StopFlag.on_signals()
+    return watch_sites(
+        args.site, args.base, args.connect, Console(), stop, bell=args.bell, as_json=args.json
+    )
 
 
 def _dashboard(args: argparse.Namespace) -> int:
@@ -106,6 +108,25 @@ def _dashboard(args: argparse.Namespace) -> int:
         print(text, flush=True)
 
     return dashboard_sites(args.site, args.connect, args.host, args.port, say, stop)
+
+
+def _notify(args: argparse.Namespace) -> int:
+    from rampe_guard.core.alarm import Level
+    from rampe_guard.programs.notifying import Wishes, notify
+    from rampe_guard.runtime.stopping import StopFlag
+
+    wishes = Wishes(
+        args.site,
+        args.base,
+        args.connect,
+        Level[args.at_least.upper()],
+        args.commands,
+        args.post,
+        args.sound,
+        args.timeout,
+        args.per_minute,
+    )
+    return notify(wishes, StopFlag.on_signals())
 
 
 def _replay(args: argparse.Namespace) -> int:
@@ -152,19 +173,12 @@ def _model(args: argparse.Namespace) -> int:
 
 
 def _schema(args: argparse.Namespace) -> int:
-    from rampe_guard.settings import scene_schema, site_schema
-    from rampe_guard.wire import json_schemas
-    from rampe_guard.wire.asyncapi import asyncapi_text
+    from rampe_guard.programs.contract import contract_text, write_contract
 
-    schemas = {"site": site_schema(), "scene": scene_schema(), **json_schemas()}
-    if args.name is None:
-        print(json.dumps(schemas, indent=2))
-    elif args.name == "asyncapi":
-        print(asyncapi_text(), end="")
-    elif args.name in schemas:
-        print(json.dumps(schemas[args.name], indent=2))
+    if args.out is not None:
+        write_contract(args.out)
     else:
-        raise RampeGuardError(f"no schema {args.name!r}; there are {', '.join(schemas)}, asyncapi")
+        print(contract_text(args.name), end="")
     return 0
 
 
@@ -212,11 +226,14 @@ def _parser() -> argparse.ArgumentParser:
     _site(sweep)
     sweep.set_defaults(command=_sweep)
 
-    watch = commands.add_parser("watch", help="one machine on the terminal")
-    _site(watch, connect=True)
-    watch.set_defaults(command=_watch)
+    watch = commands.add_parser("watch", help="one machine, or many, on the terminal")
+    _watch_options(watch)
 
     _dashboard_options(commands.add_parser("dashboard", help="machines in the browser, in 3D"))
+
+    notify = commands.add_parser("notify", help="alerts to commands, URLs and a sound")
+    _notify_options(notify)
+    notify.set_defaults(command=_notify)
 
     replay = commands.add_parser("replay", help="a CSV log through the guard")
     _site(replay, connect=True)
@@ -247,6 +264,7 @@ def _parser() -> argparse.ArgumentParser:
     schema.add_argument(
         "name", nargs="?", help="one of them, such as rampe.alert.v1, or asyncapi: keys and QoS"
     )
+    schema.add_argument("--out", metavar="FOLDER", help="write the message contract there instead")
     schema.set_defaults(command=_schema)
 
     _alert_requests(
@@ -254,6 +272,64 @@ def _parser() -> argparse.ArgumentParser:
         commands.add_parser("shelve", help="silence an alert for a short while"),
     )
     return parser
+
+
+def _watch_options(watch: argparse.ArgumentParser) -> None:
+    watch.add_argument("site", nargs="*", help="site files (YAML); one alone is shown in detail")
+    watch.add_argument(
+        "--base",
+        action="append",
+        default=[],
+        metavar="KEYEXPR",
+        help="guards by the prefix of their keys, such as 'rampe/*/*/guard'",
+    )
+    _connect(watch)
+    watch.add_argument("--bell", action="store_true", help="ring the terminal's bell")
+    watch.add_argument("--json", action="store_true", help="one JSON object a line, for scripts")
+    watch.set_defaults(command=_watch)
+
+
+def _notify_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("site", nargs="?", help="site file (YAML): its machine, its network")
+    parser.add_argument(
+        "--base",
+        action="append",
+        default=[],
+        metavar="KEYEXPR",
+        help="machines by the prefix of their guards' keys, such as 'rampe/*/*/guard'",
+    )
+    _connect(parser)
+    parser.add_argument(
+        "--at-least",
+        choices=("caution", "warning", "imminent"),
+        default="warning",
+        help="level from which on to tell (default warning); lost protection is always told",
+    )
+    parser.add_argument(
+        "--command",
+        action="append",
+        default=[],
+        dest="commands",
+        metavar="LINE",
+        help="run it, without a shell; {text}, {level} and more are replaced, JSON on its stdin",
+    )
+    parser.add_argument(
+        "--post", action="append", default=[], metavar="URL", help="post JSON to it"
+    )
+    parser.add_argument(
+        "--sound",
+        metavar="PLAYER",
+        help="play a WAV file with it until acknowledged, such as 'aplay -q'; or: bell",
+    )
+    parser.add_argument(
+        "--timeout", type=_positive, default=5.0, help="of each try, in seconds (default 5)"
+    )
+    parser.add_argument(
+        "--per-minute",
+        type=_positive,
+        default=60.0,
+        help="what each command and URL may get in the long run (default 60)",
+    )
 
 
 def _model_actions(model: argparse.ArgumentParser) -> None:
