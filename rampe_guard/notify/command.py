@@ -22,6 +22,8 @@ FIELDS = (
     "protection",
 )
 """Fields of a notice that are given one by one; what a notice has not is empty."""
+_LONGEST = 1000
+"""An argument may not be endless, or nothing can be run."""
 
 
 class Command:
@@ -54,9 +56,9 @@ class Command:
 
 
 def _word(value: object) -> str:
-    """Plain text that a process can be given."""
+    """Plain text that a process can be given, and a terminal shown; all of it is on stdin."""
     if value is None:
         return ""
     if isinstance(value, bool):
         return "true" if value else "false"
-    return "".join(letter if letter.isprintable() else "?" for letter in str(value))
+    return "".join(letter if letter.isprintable() else "?" for letter in str(value)[:_LONGEST])
