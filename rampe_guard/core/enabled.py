@@ -60,13 +60,21 @@ class EnableKey:
         self._contradicted_s: float | None = None
 
     def take(self, sample: EnabledSample) -> Accepted[EnabledSample] | Fault:
-        """Take a message, or tell why it was refused."""
+        """Take a message, or tell why it was refused; "on" is believed however it is stamped."""
         verdict = self._gate.check(sample)
-        if isinstance(verdict, Accepted):
-            self._word, self._said_s = sample, sample.arrival_s
-            if sample.stamped:
-                self._said_s = self._clock.measured_s(sample.stamp_s, sample.arrival_s)
+        if sample.enabled:
+            verdict = Accepted(sample)
+        if isinstance(verdict, Fault):
+            self.refused()
+            return verdict
+        self._word, self._said_s = sample, sample.arrival_s
+        if sample.stamped and not sample.enabled:
+            self._said_s = self._clock.measured_s(sample.stamp_s, sample.arrival_s)
         return verdict
+
+    def refused(self) -> None:
+        """Something came that cannot be used: nobody knows what it would have said."""
+        self._word = None
 
     def moved(self, sample: ActuatorSample, *, restarted: bool) -> None:
         """Take an accepted position of the machine."""
@@ -107,8 +115,7 @@ class EnableKey:
         if self._timeout_s is None:
             return []
         found = []
-        old = self._word is None or now_s - self._said_s > self._timeout_s
-        if old and now_s - self._start_s > self._timeout_s:
+        if now_s - max(self._said_s, self._start_s) > self._timeout_s:
             late = self._word is not None and now_s - self._word.arrival_s <= self._timeout_s
             text = (
                 f"no {'' if late else 'good '}enabled message for more than {self._timeout_s:g} s"

@@ -239,7 +239,9 @@ class Guard:
 
     def _refuse(self, name: InputName, reason: str, now_s: float) -> None:
         self._monitor.reject(name, reason, now_s)
-        if name != "enabled":
+        if name == "enabled":
+            self._enable.refused()
+        else:
             self._intention.interrupt()
 
     def _restart(self, accepted: Accepted[JoystickSample] | Accepted[ActuatorSample]) -> None:

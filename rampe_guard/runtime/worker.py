@@ -125,16 +125,21 @@ class Worker:
 
     def _publish(self, event: Event, compute_ms: float | None) -> None:
         if isinstance(event, AlertEvent):
-            message = self._scribe.alert(event, compute_ms)
-            self._alerts.put(wire.encode(message))
-            if event.kind == "transition":
-                self._say.info(f"{message.level}: {message.text}")
+            self._publish_alert(event, compute_ms)
         elif isinstance(event, PredictionEvent):
             self._prediction = self._scribe.prediction(event)
             self._predictions.put(wire.encode(self._prediction))
         else:
             kind = f"{event.input}:{event.reason}"
             self._say.warn(kind, f"{event.input}: refused: {event.reason}: {event.detail}")
+
+    def _publish_alert(self, event: AlertEvent, compute_ms: float | None) -> bytes:
+        message = self._scribe.alert(event, compute_ms)
+        payload = wire.encode(message)
+        self._alerts.put(payload)
+        if event.kind == "transition":
+            self._say.info(f"{message.level}: {message.text}")
+        return payload
 
     def _beat(self, now_s: float) -> None:
         self._pulse.tick += 1
@@ -186,8 +191,7 @@ class Worker:
             request.refuse(str(error))
             return
         for event in events:
-            self._publish(event, None)
-            request.reply(wire.encode(self._scribe.alert(event)))
+            request.reply(self._publish_alert(event, None))
 
     def _acknowledge(self, payload: bytes, now_s: float) -> tuple[AlertEvent, ...]:
         ack = wire.decode(payload, wire.Ack, limit=wire.MAX_PAYLOAD_BYTES)
