@@ -21,7 +21,8 @@ class Alert(Message, frozen=True, kw_only=True):
         Literal["rampe.alert.v1"], Meta(description="Name and version of this contract.")
     ] = SCHEMA
     alert_id: Annotated[
-        str, Meta(description="Identifies the alert from its rise to its end; for `ack`.")
+        str,
+        Meta(description="Identifies the alert from its rise to its end; for `ack`, `shelve`."),
     ]
     boot_id: f.BootId
     seq: f.Seq
@@ -93,7 +94,10 @@ class Alert(Message, frozen=True, kw_only=True):
     ]
     text: Annotated[
         str,
-        Meta(description="For a cab display.", extra_json_schema={"maxLength": 60}),
+        Meta(
+            description="For a cab display: link, zone and time, on at most 60 cells.",
+            extra_json_schema={"maxLength": 60},
+        ),
     ]
 
 
