@@ -89,11 +89,16 @@ def _sweep(args: argparse.Namespace) -> int:
 def _watch(args: argparse.Namespace) -> int:
     from rich.console import Console
 
-    from rampe_guard.programs.control_room import watch_sites
     from rampe_guard.runtime.stopping import StopFlag
 
     stop = StopFlag.on_signals()
-    return watch_sites(
+    if len(args.site) == 1 and not args.base and not args.json:
+        from rampe_guard.programs.watch_one import watch_one
+
+        return watch_one(args.site[0], args.connect, Console(), stop, bell=args.bell)
+    from rampe_guard.programs.control_room import watch_many
+
+    return watch_many(
         args.site, args.base, args.connect, Console(), stop, bell=args.bell, as_json=args.json
     )
 

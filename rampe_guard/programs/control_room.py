@@ -1,4 +1,4 @@
-"""``rampe-guard watch``: one machine in detail, or many, a line each."""
+"""``rampe-guard watch`` of many machines, or as JSON lines; needs no meshes."""
 
 from __future__ import annotations
 
@@ -7,22 +7,18 @@ from collections.abc import Sequence
 
 from rich.console import Console
 
-from rampe_guard.collision import load_arm
 from rampe_guard.errors import SettingsError
 from rampe_guard.runtime.connecting import connect_to
 from rampe_guard.runtime.stopping import StopFlag
-from rampe_guard.runtime.zenoh_io import Bus
 from rampe_guard.settings import Site, ZenohSettings, load_site
 from rampe_guard.view.links import Link
-from rampe_guard.view.observer import Observer
 from rampe_guard.view.wall import Wall
 from rampe_guard.view.wall_watch import watch_json, watch_wall
-from rampe_guard.view.watch import watch
 
 ROUTER = "tcp/127.0.0.1:7447"
 
 
-def watch_sites(
+def watch_many(
     site_paths: Sequence[str],
     bases: Sequence[str],
     endpoints: Sequence[str],
@@ -35,7 +31,7 @@ def watch_sites(
     """Show machines until told to stop; waits for routers and guards that are not there yet.
 
     Args:
-        site_paths: site files; one alone is shown in detail.
+        site_paths: site files.
         bases: key expressions of prefixes of guards, beside the sites'.
         endpoints: Zenoh endpoints, instead of the site files'.
         console: where to.
@@ -49,11 +45,9 @@ def watch_sites(
     if not site_paths and not bases:
         raise SettingsError("nothing to watch: name a site file, or --base 'rampe/*/*/guard'")
     if bell and (as_json or not console.is_terminal):
-        raise SettingsError("--bell rings the bell of a terminal, and the output is none")
+        raise SettingsError("--bell rings a terminal's bell, and the output is no terminal")
     sites = [connect_to(load_site(path), endpoints) for path in site_paths]
-    if len(sites) == 1 and not bases and not as_json:
-        return _one(sites[0], console, stop, bell=bell)
-    names = {site.keys.base: f"{site.machine} · {site.name}" for site in sites}
+    names = {site.keys.base: (site.machine, site.name) for site in sites}
     with contextlib.ExitStack() as stack:
         links = [stack.enter_context(link) for link in _links(sites, bases, endpoints)]
         if as_json:
@@ -61,18 +55,6 @@ def watch_sites(
         else:
             asked = (*names, *bases)
             watch_wall(links, Wall(0.0, names=names, asked=asked), stop, console, bell=bell)
-    return 0
-
-
-def _one(site: Site, console: Console, stop: StopFlag, *, bell: bool) -> int:
-    arm = stop.unless_stopped(lambda: load_arm(site.arm))
-    if arm is None:
-        return 0
-    bus = Bus.open_retrying(site.zenoh, stop, console.print, stop.wait)
-    if bus is None:
-        return 0
-    with bus:
-        watch(Observer(bus, site, arm.limits), stop, console, bell=bell)
     return 0
 
 

@@ -46,6 +46,7 @@ class Link:
         self._zenoh, self._bases = zenoh, tuple(bases)
         self._closing = threading.Event()
         self._items: deque[Item] = deque(maxlen=_MAX_WAITING)
+        self._missing: list[Item] = []
         self._failure: BaseException | None = None
         self._fleet = Fleet()
         self.problem: str | None = None
@@ -77,7 +78,7 @@ class Link:
         for base in self._bases:
             if "*" not in base and "$" not in base:
                 self._fleet, items = core.expect(self._fleet, base, time.monotonic())
-                self._items.extend(items)
+                self._missing.extend(items)
 
     def _join(self) -> Bus | None:
         while not self._closing.is_set():
@@ -85,6 +86,8 @@ class Link:
                 bus = Bus.open(self._zenoh)
             except ConnectionFailedError as error:
                 self.problem = str(error)
+                self._items.extend(self._missing)
+                self._missing.clear()
                 self._closing.wait(_TRY_AGAIN_S)
             else:
                 self.problem = None

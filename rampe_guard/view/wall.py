@@ -21,12 +21,14 @@ class Row:
     """One machine.
 
     Attributes:
-        name: for people.
+        name: for people; with the site where another site has a machine of that name.
+        site: its name; empty while it is not known.
         state: what is known of it.
         alerts: all that are not over, the gravest first.
     """
 
     name: str
+    site: str
     state: MachineState
     alerts: tuple[AlertView, ...]
 
@@ -41,6 +43,18 @@ class Row:
         if self.state.protection is not Protection.NOT_MONITORING:
             return False
         return any(a.source == "system" and not a.attention for a in self.alerts)
+
+    @property
+    def details(self) -> tuple[AlertView, ...]:
+        """The alerts to show below the machine: its own line tells that it does not monitor."""
+        return tuple(a for a in self.alerts if not (self.lost and a.source == "system"))
+
+    @property
+    def why(self) -> str:
+        """Why it is not plainly monitoring, and who has seen that."""
+        seen = (a.acked_by for a in self.alerts if a.source == "system" and self.seen)
+        names = [f"seen by {who}" for who in seen if who]
+        return "; ".join((*self.state.reasons, *names))
 
     @property
     def gravest(self) -> AlertView | None:
@@ -64,7 +78,7 @@ class Wall:
     Attributes:
         now_s: time of the picture [s].
         rows: machines in an order that does not change with what happens to them.
-        names: what machines are called before they are heard, by base.
+        names: machine and site before they are heard, by base.
         events: newest first.
         problems: of the view itself: networks that it cannot hear.
         asked: key expressions that are watched.
@@ -73,15 +87,18 @@ class Wall:
 
     now_s: float
     rows: tuple[Row, ...] = ()
-    names: Mapping[str, str] = field(default_factory=dict)
+    names: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     events: tuple[EventView, ...] = ()
     problems: tuple[str, ...] = ()
     asked: tuple[str, ...] = ()
     clock: str = ""
 
-    def name(self, base: str, machine: str, site: str) -> str:
-        """What people call the machine at ``base``."""
-        return f"{machine} · {site}" if machine else self.names.get(base, base)
+    def name(self, base: str, machine: str, site: str) -> tuple[str, str]:
+        """What people call the machine at ``base``, and its site."""
+        if not machine:
+            machine, site = self.names.get(base, (base, ""))
+        twin = any(row.state.base != base and row.state.machine == machine for row in self.rows)
+        return f"{machine} · {site}" if twin else machine, site
 
     def hear(self, items: Iterable[Item], now_s: float) -> Wall:
         """Put what happened on top of the events."""
@@ -89,7 +106,7 @@ class Wall:
             EventView(
                 now_s,
                 Level[item.level.upper()],
-                f"{self.name(item.base, item.machine, item.site)}: {words(item)}",
+                f"{self.name(item.base, item.machine, item.site)[0]}: {words(item)}",
                 lost(item),
             )
             for item in items
@@ -108,13 +125,13 @@ class Wall:
         """Show what is known now."""
         rows = [
             Row(
-                self.name(machine.base, machine.machine, machine.site),
+                *self.name(machine.base, machine.machine, machine.site),
                 machine,
                 tuple(alert_view(alert, alert.received_s) for alert in machine.alerts),
             )
             for machine in machines
         ]
-        rows.sort(key=lambda row: (row.name, row.state.base))
+        rows.sort(key=lambda row: (row.site, row.name, row.state.base))
         return replace(self, now_s=now_s, rows=tuple(rows), problems=tuple(problems), clock=clock)
 
 
@@ -143,6 +160,6 @@ def fitted(rows: tuple[Row, ...], lines: int) -> Fit:
     left = lines - len(shown) - bool(hidden)
     details: dict[str, int] = {}
     for row in sorted(shown, key=lambda row: row.trouble):
-        details[row.state.base] = max(0, min(left, len(row.alerts)))
+        details[row.state.base] = max(0, min(left, len(row.details)))
         left -= details[row.state.base]
     return Fit(tuple((row, details[row.state.base]) for row in rows if row in shown), hidden)

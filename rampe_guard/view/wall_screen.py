@@ -103,14 +103,15 @@ def _machine(row: Row, now_s: float, width: int) -> Table:
         style = LOST_TURNED
     table = Table(box=None, padding=(0, 1, 0, 0), show_header=False, width=width)
     wide = width >= WIDE
-    for cells in (34 if wide else 20, 18):
+    for cells in (34 if wide else 13, 18 if wide else 16):
         table.add_column(no_wrap=True, width=cells, overflow="ellipsis")
     table.add_column(no_wrap=True, ratio=1, overflow="ellipsis")
-    table.add_column(no_wrap=True, justify="right", width=32 if wide else 11)
+    table.add_column(no_wrap=True, justify="right", width=32 if wide else 6)
     table.add_column(no_wrap=True, justify="right", width=6)
+    site = f" · {row.site}" if wide and row.site and row.site not in row.name else ""
     table.add_row(
-        Text(row.name, "bold"),
-        Text(f" {word} ", style),
+        Text(row.name, "bold").append(site, "not bold"),
+        Text(word, style),
         _gravest(row, now_s),
         _inputs(row, wide=wide),
         _beat(row),
@@ -122,12 +123,12 @@ def _machine(row: Row, now_s: float, width: int) -> Table:
 def _gravest(row: Row, now_s: float) -> Text:
     alert = row.gravest
     if row.lost:
-        return Text("; ".join(row.state.reasons), LOST)
+        return Text(row.why, LOST)
     if alert is not None:
         text = level_text(alert.level, flashes=alert.flashes, now_s=now_s)
-        return text.append(f" {alert.text}", "bold" if alert.level > Level.CAUTION else "")
+        return text.append(alert.text, "bold" if alert.level > Level.CAUTION else "")
     if row.state.protection is Protection.DEGRADED:
-        return Text("; ".join(row.state.reasons), "yellow")
+        return Text(row.why, "yellow")
     return Text("· no alert" if row.state.protection is Protection.MONITORING else "", GREY)
 
 
@@ -136,8 +137,10 @@ def _inputs(row: Row, *, wide: bool) -> Text:
     if beat is None or row.state.silent:
         return Text("—", GREY if not row.lost else "")
     ages = beat.input_age_s
-    levers, arm = _ms(ages.joystick_s), _ms(ages.actuators_s)
-    text = f"joystick {levers}, actuators {arm} ms" if wide else f"{levers} · {arm} ms"
+    levers, arm = ages.joystick_s, ages.actuators_s
+    text = _short(None if levers is None or arm is None else max(levers, arm))
+    if wide:
+        text = f"joystick {_short(levers)}, actuators {_short(arm)}"
     return Text(text, "" if row.lost else GREY)
 
 
@@ -148,13 +151,13 @@ def _beat(row: Row) -> Text:
 
 def _details(row: Row, count: int, now_s: float, width: int) -> RenderableType:
     """As many alerts as there is room for; the last line says how many are missing."""
-    if count >= len(row.alerts):
-        return alert_table(row.alerts, now_s, width, _INDENT)
-    missing = len(row.alerts) - count + 1
+    if count >= len(row.details):
+        return alert_table(row.details, now_s, width, _INDENT)
+    missing = len(row.details) - count + 1
     more = Text(f"{' ' * _INDENT} … {missing} more", DIM)
     if count == 1:
         return more
-    return Group(alert_table(row.alerts[: count - 1], now_s, width, _INDENT), more)
+    return Group(alert_table(row.details[: count - 1], now_s, width, _INDENT), more)
 
 
 def _hidden(rows: Sequence[Row], width: int) -> Text:
@@ -180,6 +183,7 @@ def _event_rows(wall: Wall, rows: int, width: int) -> Iterator[Text]:
         yield line.append_text(event_line(event, fit(event.text, width - len(when) - 2)))
 
 
-def _ms(seconds: float | None) -> str:
-    most = 9999.0
-    return "—" if seconds is None else f"{min(most, seconds * 1000.0):.0f}"
+def _short(seconds: float | None) -> str:
+    if seconds is None:
+        return "none"
+    return f"{seconds * 1000.0:.0f} ms" if seconds < 1.0 else age(seconds)

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import io
 import re
 from dataclasses import replace
 
 import pytest
 from rich.cells import cell_len
-from rich.console import Console, RenderableType
 
 from rampe_guard.client.items import Protection
 from rampe_guard.core.alarm import Level
@@ -21,6 +19,7 @@ from rampe_guard.view.state import (
     HealthView,
     ViewState,
 )
+from tests.support.rendered import line_of, shown
 
 NOW = 100.0
 ACTUATORS = (
@@ -57,23 +56,6 @@ STATE = ViewState(
     "excavator-7", "quarry-north", NOW, ACTUATORS, 12, NOW, NOW, NOW, HEALTH, ALERTS, EVENTS
 )
 CALM = replace(STATE, alerts=())
-
-
-def shown(renderable: RenderableType, width: int = 80, *, styles: bool = False) -> str:
-    console = Console(
-        record=True,
-        width=width,
-        file=io.StringIO(),
-        force_terminal=True,
-        color_system="truecolor",
-        legacy_windows=False,
-    )
-    console.print(renderable)
-    return console.export_text(styles=styles)
-
-
-def line_of(text: str, word: str) -> str:
-    return next(line for line in text.splitlines() if word in line)
 
 
 @pytest.mark.parametrize("width", [80, 120])
