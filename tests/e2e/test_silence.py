@@ -97,8 +97,13 @@ def shelve_for_a_while(live: Station, alert_id: str, contract: Contract) -> None
     assert [a["shelved_by"] for a in state["alerts"] if a["alert_id"] == alert_id] == ["tester"]
     levels = [a["level"] for a in state["alerts"]]
     assert levels[:2] == ["imminent", "warning"]  # the gravest first
-    (again,) = ears.ask(f"{base}/shelve", wish(0.0))
-    assert (again["inhibit"], again["shelved_by"]) == ("none", None)
+    done = processes.command(
+        *("shelve", live.site_path, alert_id, "--who", "tester", "--for", "0"),
+        *("--connect", live.endpoint),
+    )
+    assert done.returncode == 0, done.stderr
+    ended = ears.wait("alert", lambda b: b["inhibit"] == "none", 2.0, heard.at_s)
+    assert (ended.body["shelved_by"], ended.body["shelved_until_unix_s"]) == (None, None)
 
 
 def on_change_site(folder: Path) -> Path:
