@@ -21,6 +21,11 @@ def check(model: SiteModel, problems: Problems) -> None:
     if model.alerts.caution_probability > model.alerts.warning_probability:
         what = f"{model.alerts.caution_probability:g} is greater than warning_probability"
         problems.add(("alerts", "caution_probability"), what, "give at most that probability")
+    if model.alerts.expires_after_s < 2.0 * model.alerts.republish_s:
+        what = f"{model.alerts.expires_after_s:g} s is less than two periods of republish_s"
+        problems.add(
+            ("alerts", "expires_after_s"), what, "let an alert outlive the loss of one repeat"
+        )
     _rampe(model, problems)
     _actuators(model.arm, problems)
     _linkages(model.arm, problems)

@@ -183,6 +183,18 @@ def test_off_holds_only_until_anything_else_comes(then: Inputs) -> None:
     assert status(rig) is Status.NOT_MONITORING  # no input has come yet
 
 
+def test_a_word_that_lags_behind_the_machine_by_its_stamp_is_old() -> None:
+    rig = CoreRig(config=KEYED)
+    rig.hold(0.0, 3.0)
+    late = EnabledSample(enabled=False, stamp_s=rig.now - 2.5, arrival_s=rig.now)
+    rig.guard.step(Inputs(enabled=(late,)), rig.now)
+    rig.hold(0.0, 0.1)
+    (reason,) = rig.guard.snapshot(rig.now).health.reasons
+    assert reason.code == "enabled_silent"
+    assert "by the stamps of the actuators" in reason.text
+    assert status(rig) is Status.DEGRADED
+
+
 def test_a_key_that_never_speaks_is_told_and_reads_as_on() -> None:
     rig = CoreRig(config=KEYED)
     rig.hold(0.0, ENABLED_S + 0.5)

@@ -263,6 +263,7 @@ def test_mistake_is_named_with_line_key_value_and_remedy(
         ("memory: {directory: ~nobody-here/a}", "begins with a home that does not exist"),
         ("stopping:", "stopping: nothing is not a mapping"),
         ("alerts: {caution_probability: 0.9}", "0.9 is greater than warning_probability"),
+        ("alerts: {republish_s: 0.6}", "expires_after_s: 1 s is less than two periods of republ"),
         ("alerts: {shelve_max_s: 31}", "alerts.shelve_max_s: 31 is greater than 30"),
         ("log: {time: t, joystick: {}, actuators: {}}", "has no column for swing, boom"),
         (
