@@ -19,11 +19,13 @@ def alert_table(alerts: Sequence[AlertView], now_s: float, width: int, indent: i
     """The alerts, the gravest first, in ``width`` cells."""
     table = Table(box=None, padding=(0, 1, 0, 0), header_style=GREY, width=width, show_header=False)
     table.add_column(no_wrap=True, width=12 + indent)
-    for justify in ("left", "right", "right", "left"):
-        table.add_column(justify=justify, no_wrap=True, overflow="ellipsis")
-    table.columns[1].ratio = 1
+    table.add_column(no_wrap=True, overflow="ellipsis", ratio=1)
+    # fixed, so that tables of several machines stand in line
+    table.add_column(no_wrap=True, justify="right", width=8)
+    table.add_column(no_wrap=True, justify="right", width=4)
+    table.add_column(no_wrap=True, overflow="ellipsis", width=25)
     if width >= WIDE:
-        table.add_column(no_wrap=True)
+        table.add_column(no_wrap=True, width=28)
     for alert in sorted(alerts, key=lambda a: urgency(a.level, a.time_to_collision_s)):
         level, *rest = _cells(alert, now_s, width)
         table.add_row(Text(" " * indent).append_text(level), *rest)

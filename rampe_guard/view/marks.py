@@ -63,7 +63,7 @@ def level_text(level: Level, *, flashes: bool = False, now_s: float = 0.0) -> Te
 
 def hatched(words: str, width: int, *, turned: bool = False) -> Text:
     """``words`` in the middle of a hatched bar across ``width`` cells."""
-    words = fit(f"  {words}  ", width)
+    words = fit(f"  {words}  ", width) if words else ""
     left = (width - cell_len(words)) // 2
     right = width - cell_len(words) - left
     return Text(f"{HATCH * left}{words}{HATCH * right}", LOST_TURNED if turned else LOST)

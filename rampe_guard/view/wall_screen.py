@@ -125,7 +125,7 @@ def _gravest(row: Row, now_s: float) -> Text:
     if row.lost:
         return Text(row.why, LOST)
     if alert is not None:
-        text = level_text(alert.level, flashes=alert.flashes, now_s=now_s)
+        text = level_text(alert.level, flashes=alert.flashes, now_s=now_s)[1:]
         return text.append(alert.text, "bold" if alert.level > Level.CAUTION else "")
     if row.state.protection is Protection.DEGRADED:
         return Text(row.why, "yellow")
