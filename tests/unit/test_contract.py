@@ -12,7 +12,13 @@ import jsonschema  # type: ignore[import-untyped]
 import pytest
 from ruamel.yaml import YAML
 
-from rampe_guard.programs.contract import contract_files, message_schemas, write_contract
+from rampe_guard.errors import RampeGuardError
+from rampe_guard.programs.contract import (
+    contract_files,
+    contract_text,
+    message_schemas,
+    write_contract,
+)
 from rampe_guard.wire.channels import KEYS, PARAMETERS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -81,6 +87,14 @@ def test_writing_takes_away_what_is_no_message_any_more(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("mine")
     write_contract(tmp_path)
     assert {p.name for p in tmp_path.iterdir()} == {*contract_files(), "notes.txt"}
+
+
+def test_the_command_prints_each_of_them() -> None:
+    assert contract_text("asyncapi") == contract_files()["asyncapi.yaml"]
+    assert contract_text("rampe.ack.v1") == contract_files()["rampe.ack.v1.schema.json"]
+    assert set(json.loads(contract_text(None))) == {"site", "scene", *message_schemas()}
+    with pytest.raises(RampeGuardError, match=r"'rampe.ack.v2'; there are .*rampe.ack.v1"):
+        contract_text("rampe.ack.v2")
 
 
 @pytest.mark.parametrize("name", message_schemas())
