@@ -18,7 +18,7 @@ _CAPACITY = 4096
 _ANSWER_S = 1.0
 """How long a guard may take to tell its state; it takes milliseconds."""
 _ASK_AGAIN_S = 0.5
-_LOOK_S = 0.002
+_LOOK_S = 0.004
 _PASS_S = 0.05
 """How often the passing of time is looked at, beside the messages."""
 
@@ -37,6 +37,7 @@ class Feed:
         bases: key expressions of prefixes of guards, such as ``rampe/*/*/guard``. Of one
             without wildcards it is known that a machine should be there.
         repeats: tell repeats of alerts too.
+        answer_s: how long a guard may take to tell its state at first [s].
         expires_after_s: age at which a heartbeat must not be trusted [s].
 
     Attributes:
@@ -44,7 +45,13 @@ class Feed:
     """
 
     def __init__(
-        self, bus: Bus, bases: Sequence[str], *, repeats: bool = False, expires_after_s: float = 1.0
+        self,
+        bus: Bus,
+        bases: Sequence[str],
+        *,
+        repeats: bool = False,
+        answer_s: float = _ANSWER_S,
+        expires_after_s: float = 1.0,
     ) -> None:
         for base in bases:
             check_key_expression(f"{base}/state")
@@ -55,11 +62,12 @@ class Feed:
         self._asked_s: dict[str, float] = {}
         self._passed_s = float("-inf")
         self.fleet = Fleet(expires_after_s=expires_after_s)
-        self._open = [self._ask(base, time.monotonic()) for base in bases]
+        self._answer_s = answer_s
+        self._open = [self._ask(base, time.monotonic(), answer_s) for base in bases]
 
-    def catch_up(self, timeout_s: float = _ANSWER_S) -> list[Item]:
-        """Wait until every guard that is there has told its state [s]; the first items."""
-        deadline_s = time.monotonic() + timeout_s
+    def catch_up(self) -> list[Item]:
+        """Wait until every guard that is there has told its state; the first items."""
+        deadline_s = time.monotonic() + self._answer_s
         items: list[Item] = []
         while self._open and time.monotonic() < deadline_s:
             items += self._answers()
@@ -128,9 +136,9 @@ class Feed:
             if machine.behind and not machine.silent and now_s - asked_s >= _ASK_AGAIN_S:
                 self._open.append(self._ask(base, now_s))
 
-    def _ask(self, base: str, now_s: float) -> _Asked:
+    def _ask(self, base: str, now_s: float, answer_s: float = _ANSWER_S) -> _Asked:
         self._asked_s[base] = now_s
-        return _Asked(self._bus.inquire(f"{base}/state", _ANSWER_S), now_s)
+        return _Asked(self._bus.inquire(f"{base}/state", answer_s), now_s)
 
     def _take(self, told: Told) -> list[Item]:
         self.fleet, items = told

@@ -17,7 +17,9 @@ from rampe_guard.settings import ZenohSettings
 
 MAX_WAITING = 10_000
 """Items that may wait for a slow reader; then the oldest goes, and its loss is told."""
-_WAKE_S = 0.005
+_WAKE_S = 0.02
+"""Sleep between looks at the network: adds half of it to the latency; many clients may share
+a machine."""
 _TRY_AGAIN_S = 0.2
 
 
@@ -74,9 +76,10 @@ class Stream:
                 bus,
                 self._bases,
                 repeats=self._repeats,
+                answer_s=self._timeout_s,
                 expires_after_s=self._expires_after_s,
             )
-            self._add(feed.catch_up(self._timeout_s))
+            self._add(feed.catch_up())
         except BaseException:
             bus.close()
             raise

@@ -25,7 +25,7 @@ from rampe_guard.runtime.stopping import StopFlag
 from rampe_guard.runtime.zenoh_io import Bus
 from rampe_guard.settings import ZenohSettings, load_site
 
-_WAKE_S = 0.005
+_WAKE_S = 0.01
 _GRACE_S = 2.0
 """How long a router may be away at the start before that is told."""
 
