@@ -180,7 +180,7 @@ def _contact(alerts: Iterable[Alert], now_s: float) -> Contact | None:
     for alert in alerts:
         tone = tone_of(alert)
         if alert.contact_point_m is not None and tone is not Tone.CALM:
-            label = f"{tone.look.shape} {countdown(alert.time_to_collision_s) or 'contact'}"
+            label = f"{tone.look.shape} {alert.link or 'contact'}"
             lit = tone.lit(now_s, attention=_attention(alert))
             return Contact(alert.contact_point_m, tone, lit, label)
     return None

@@ -59,8 +59,8 @@ def side(picture: Picture) -> str:
     keys = [
         f'<span><i style="background:{colour}"></i>{words}</span>'
         for shown, colour, words in (
-            (picture.intent is not None, "#4f8fd0", "where he usually goes from here"),
-            (picture.stopping is not None, "#b07cd8", "where it stops if he lets go now"),
+            (picture.intent is not None, "#4f8fd0", "where the operator usually goes"),
+            (picture.stopping is not None, "#b07cd8", "where it stops if let go now"),
         )
         if shown
     ]

@@ -46,6 +46,7 @@ class Solid:
         shell: its margin round it, or None.
         top: where its label stands [m].
         flat: a wide floor or wall, drawn so that the arm stands out before it.
+        sheer: so wide that it is seen through: an endless halfspace may be a ceiling.
         moves: it is placed by messages.
     """
 
@@ -54,6 +55,7 @@ class Solid:
     shell: Triangles | None
     top: Point
     flat: bool
+    sheer: bool
     moves: bool
 
 
@@ -82,6 +84,7 @@ def _solid(item: KeepOut, reach_m: float) -> Solid:
         shell=shell,
         top=(float(middle[0]), float(middle[1]), float(high[2])),
         flat=isinstance(item, (Mesh, Halfspace)),
+        sheer=isinstance(item, Halfspace),
         moves=item.key is not None,
     )
 

@@ -21,13 +21,14 @@ from rampe_guard.dashboard.tones import Rgb, Tone
 
 _ARM: Rgb = (86, 112, 138)
 _ARM_STALE: Rgb = (98, 98, 98)
-_FLAT: dict[bool, Rgb] = {True: (58, 57, 53), False: (150, 147, 138)}
+_FLAT: dict[bool, Rgb] = {True: (74, 72, 67), False: (150, 147, 138)}
 """Of ground and walls, by night and by day: the rest must stand out before it."""
 _FLAT_LOST: dict[bool, Rgb] = {True: (40, 40, 40), False: (128, 128, 128)}
 _INTENT: Rgb = (79, 143, 208)
 _STOPPING: Rgb = (176, 124, 216)
 _SEE_THROUGH = 0.22
 _SHELL = 0.10
+_SHEER = 0.15
 _GHOST_S = 0.08
 """Ghosts move less often than the arm: they are many, and only hints [s]."""
 
@@ -78,7 +79,17 @@ class Stage:
         self._scene = client.scene
         self._model = model
         self._ghosts_s = -np.inf
-        self._scene.configure_default_lights(cast_shadow=False)
+        # no reflections, no shadows: a tablet, or a machine without a graphics card, draws it
+        # fifty times as fast
+        self._scene.configure_environment_map(None)
+        self._scene.configure_default_lights(enabled=False)
+        self._scene.add_light_hemisphere(
+            "/light/sky", sky_color=(255, 255, 255), ground_color=(120, 116, 110), intensity=1.6
+        )
+        for name, intensity, way in (("sun", 1.6, (-0.5, -1.0, 1.6)), ("back", 0.5, (1, 0.6, 0.8))):
+            self._scene.add_light_directional(
+                f"/light/{name}", intensity=intensity, position=way, cast_shadow=False
+            )
         self._zones = [self._zone(solid) for solid in model.solids]
         self._links = [self._link(i) for i in range(len(model.bodies))]
         self._intent = self._ghosts("intent", INTENT, _INTENT)
@@ -113,13 +124,15 @@ class Stage:
 
     def _look_from(self, client: viser.ClientHandle) -> None:
         middle, reach = self._model.middle, self._model.reach_m
-        client.camera.position = middle + reach * np.array([-0.75, -1.10, 0.85])
-        client.camera.look_at = middle + reach * np.array([0.30, 0.08, 0.16])  # it moves with it
+        client.camera.position = middle + reach * np.array([-0.58, -0.95, 0.70])
+        client.camera.look_at = middle + reach * np.array([0.28, 0.10, 0.16])  # it moves with it
 
     def _zone(self, solid: Solid) -> _ZoneNodes:
         path = f"/zones/{solid.name}"
         frame = self._scene.add_frame(path, show_axes=False)
         body = self._mesh(f"{path}/body", solid.body, shade=not solid.flat)
+        if solid.sheer:
+            body.put(opacity=_SHEER)
         shell = None
         if solid.shell is not None:
             shell = Node(
