@@ -21,6 +21,9 @@ from typing import Any
 import numpy as np
 
 from rampe_guard.client import Alert, Alerts, Item, MessagesLost, Protection
+from rampe_guard.client.feed import Feed
+from rampe_guard.runtime.zenoh_io import Bus
+from rampe_guard.settings import ZenohSettings
 from tests.support.processes import Process, until
 from tests.support.station import Station, station
 
@@ -39,7 +42,7 @@ def main() -> int:
         live.calm()
         live.press_on_crate()
         late(live, args.joins)
-        return crowd(live, Path(name), args.clients, args.processes)
+        return crowd(live, Path(name), args.clients, args.processes) if args.clients else 0
 
 
 def late(live: Station, joins: int) -> None:
@@ -54,6 +57,15 @@ def late(live: Station, joins: int) -> None:
             assert any(alert.zone == "crate" for alert in machine.active)
             assert not machine.behind
     say("one joins, session and whole state", known_ms)
+    told_ms = []
+    with Bus.open(ZenohSettings(None, "client", (live.endpoint,))) as bus:
+        for _ in range(joins):
+            began_s = time.perf_counter()
+            feed = Feed(bus, [live.site.keys.base])
+            feed.catch_up()
+            told_ms.append((time.perf_counter() - began_s) * 1e3)
+            assert any(a.zone == "crate" for a in feed.fleet.machines[live.site.keys.base].active)
+    say("whole state, session open already", told_ms)
 
 
 def crowd(live: Station, folder: Path, clients: int, processes: int) -> int:
