@@ -40,7 +40,8 @@ class Post:
             good = False
         if not good:
             raise SettingsError(f"{url!r} is no URL such as http://127.0.0.1:8080/alerts")
-        self.name = f"{parts.scheme}://{parts.hostname}"  # the rest may be a secret
+        where = parts.netloc.rpartition("@")[2]
+        self.name = f"{parts.scheme}://{where}"  # the rest may be a secret
         self._url, self._timeout_s = url, timeout_s
         self._opener = urllib.request.build_opener(_NoRedirect())
 

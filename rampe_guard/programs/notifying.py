@@ -8,7 +8,14 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rampe_guard.client import Item, MachineState, Protection, ProtectionBack, ProtectionLost
+from rampe_guard.client import (
+    Alert,
+    Item,
+    MachineState,
+    Protection,
+    ProtectionBack,
+    ProtectionLost,
+)
 from rampe_guard.client.feed import Feed
 from rampe_guard.core.alarm import Level
 from rampe_guard.errors import SettingsError
@@ -126,7 +133,8 @@ class Desk:
             self._sound.stop()
 
     def _take(self, item: Item, machine: MachineState | None) -> None:
-        self._say.info(f"{item.machine or item.base}: {item.level}: {item.text}")
+        level = f"{item.level}: " if isinstance(item, Alert) else ""  # of zones, not of guards
+        self._say.info(f"{item.machine or item.base}: {level}{item.text}")
         notice = notice_of(item, self._at_least)
         if notice is not None:
             self._offer(notice)

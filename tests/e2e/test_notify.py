@@ -86,7 +86,7 @@ def room(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Room]:
         args += ["--command", "sleep 60", "--post", phone.url]
         args += ["--sound", f"sh {folder}/play.sh {played}"]
         with Process(folder, "notify", args) as notify:
-            notify.wait_for("excavator-3: clear: monitoring")
+            notify.wait_for("excavator-3: monitoring")
             yield Room(made, notify, phone, log, played)
     phone.server.shutdown()
     phone.server.server_close()
