@@ -7,6 +7,7 @@ The public API, small and typed; the command line is a thin layer over it::
     model = rampe_guard.Rampe(actuators=2, mode="faithful", n_init=3)
     guard = rampe_guard.Guard(site)
     events = guard.step(rampe_guard.Inputs(joystick=..., actuators=...), now_s=12.34)
+    with rampe_guard.client.Alerts("tcp/127.0.0.1:7447", "rampe/*/*/guard") as alerts: ...
 
 Each name loads only what it needs.
 """
@@ -17,6 +18,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from rampe_guard import client
     from rampe_guard.assembly import Sweeper
     from rampe_guard.assembly import guard_for as Guard  # noqa: N812 - reads as a class in the API
     from rampe_guard.core.rampe import Rampe
@@ -54,12 +56,15 @@ __all__ = [
     "SettingsError",
     "Site",
     "Sweeper",
+    "client",
     "load_site",
 ]
 
 
 def __getattr__(name: str) -> Any:
     """Load a public name when it is first used."""
+    if name == "client":
+        return import_module("rampe_guard.client")
     if name not in _HOME:
         raise AttributeError(f"module 'rampe_guard' has no attribute {name!r}")
     module, attribute = _HOME[name]

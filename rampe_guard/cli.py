@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import faulthandler
-import json
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -90,10 +89,49 @@ def _sweep(args: argparse.Namespace) -> int:
 def _watch(args: argparse.Namespace) -> int:
     from rich.console import Console
 
-    from rampe_guard.programs.watching import watch_site
     from rampe_guard.runtime.stopping import StopFlag
 
-    return watch_site(args.site, args.connect, Console(), StopFlag.on_signals())
+    stop = StopFlag.on_signals()
+    if len(args.site) == 1 and not args.base and not args.json:
+        from rampe_guard.programs.watch_one import watch_one
+
+        return watch_one(args.site[0], args.connect, Console(), stop, bell=args.bell)
+    from rampe_guard.programs.control_room import watch_many
+
+    return watch_many(
+        args.site, args.base, args.connect, Console(), stop, bell=args.bell, as_json=args.json
+    )
+
+
+def _dashboard(args: argparse.Namespace) -> int:
+    from rampe_guard.runtime.stopping import StopFlag
+
+    stop = StopFlag.on_signals()  # before the imports, which take a while
+    from rampe_guard.programs.dashboarding import dashboard_sites
+
+    def say(text: str) -> None:
+        print(text, flush=True)
+
+    return dashboard_sites(args.site, args.connect, args.host, args.port, say, stop)
+
+
+def _notify(args: argparse.Namespace) -> int:
+    from rampe_guard.core.alarm import Level
+    from rampe_guard.programs.notifying import Wishes, notify
+    from rampe_guard.runtime.stopping import StopFlag
+
+    wishes = Wishes(
+        args.site,
+        args.base,
+        args.connect,
+        Level[args.at_least.upper()],
+        args.commands,
+        args.post,
+        args.sound,
+        args.timeout,
+        args.per_minute,
+    )
+    return notify(wishes, StopFlag.on_signals())
 
 
 def _replay(args: argparse.Namespace) -> int:
@@ -140,16 +178,12 @@ def _model(args: argparse.Namespace) -> int:
 
 
 def _schema(args: argparse.Namespace) -> int:
-    from rampe_guard.settings import scene_schema, site_schema
-    from rampe_guard.wire import json_schemas
+    from rampe_guard.programs.contract import contract_text, write_contract
 
-    schemas = {"site": site_schema(), "scene": scene_schema(), **json_schemas()}
-    if args.name is None:
-        print(json.dumps(schemas, indent=2))
-    elif args.name in schemas:
-        print(json.dumps(schemas[args.name], indent=2))
+    if args.out is not None:
+        write_contract(args.out)
     else:
-        raise RampeGuardError(f"no schema {args.name!r}; there are {', '.join(schemas)}")
+        print(contract_text(args.name), end="")
     return 0
 
 
@@ -157,6 +191,12 @@ def _ack(args: argparse.Namespace) -> int:
     from rampe_guard.programs.watching import acknowledge
 
     return acknowledge(args.site, args.connect, args.alert, args.who)
+
+
+def _shelve(args: argparse.Namespace) -> int:
+    from rampe_guard.programs.watching import shelve
+
+    return shelve(args.site, args.connect, args.alert, args.who, vars(args)["for"])
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -191,9 +231,14 @@ def _parser() -> argparse.ArgumentParser:
     _site(sweep)
     sweep.set_defaults(command=_sweep)
 
-    watch = commands.add_parser("watch", help="one machine on the terminal")
-    _site(watch, connect=True)
-    watch.set_defaults(command=_watch)
+    watch = commands.add_parser("watch", help="one machine, or many, on the terminal")
+    _watch_options(watch)
+
+    _dashboard_options(commands.add_parser("dashboard", help="machines in the browser, in 3D"))
+
+    notify = commands.add_parser("notify", help="alerts to commands, URLs and a sound")
+    _notify_options(notify)
+    notify.set_defaults(command=_notify)
 
     replay = commands.add_parser("replay", help="a CSV log through the guard")
     _site(replay, connect=True)
@@ -220,16 +265,76 @@ def _parser() -> argparse.ArgumentParser:
     model = commands.add_parser("model", help="what is kept of an operator's way of working")
     _model_actions(model)
 
-    schema = commands.add_parser("schema", help="JSON Schemas of messages and files")
-    schema.add_argument("name", nargs="?", help="one of them, such as rampe.alert.v1")
+    schema = commands.add_parser("schema", help="JSON Schemas of messages and files, AsyncAPI")
+    schema.add_argument(
+        "name", nargs="?", help="one of them, such as rampe.alert.v1, or asyncapi: keys and QoS"
+    )
+    schema.add_argument("--out", metavar="FOLDER", help="write the message contract there instead")
     schema.set_defaults(command=_schema)
 
-    ack = commands.add_parser("ack", help="acknowledge an alert")
-    _site(ack, connect=True)
-    ack.add_argument("alert", help="its alert_id")
-    ack.add_argument("--who", required=True, help="who has seen it")
-    ack.set_defaults(command=_ack)
+    _alert_requests(
+        commands.add_parser("ack", help="acknowledge an alert"),
+        commands.add_parser("shelve", help="silence an alert for a short while"),
+    )
     return parser
+
+
+def _watch_options(watch: argparse.ArgumentParser) -> None:
+    watch.add_argument("site", nargs="*", help="site files (YAML); one alone is shown in detail")
+    watch.add_argument(
+        "--base",
+        action="append",
+        default=[],
+        metavar="KEYEXPR",
+        help="guards by the prefix of their keys, such as 'rampe/*/*/guard'",
+    )
+    _connect(watch)
+    watch.add_argument("--bell", action="store_true", help="ring the terminal's bell")
+    watch.add_argument("--json", action="store_true", help="one JSON object a line, for scripts")
+    watch.set_defaults(command=_watch)
+
+
+def _notify_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("site", nargs="?", help="site file (YAML): its machine, its network")
+    parser.add_argument(
+        "--base",
+        action="append",
+        default=[],
+        metavar="KEYEXPR",
+        help="machines by the prefix of their guards' keys, such as 'rampe/*/*/guard'",
+    )
+    _connect(parser)
+    parser.add_argument(
+        "--at-least",
+        choices=("caution", "warning", "imminent"),
+        default="warning",
+        help="level from which on to tell (default warning); lost protection is always told",
+    )
+    parser.add_argument(
+        "--command",
+        action="append",
+        default=[],
+        dest="commands",
+        metavar="LINE",
+        help="run it, without a shell; {text}, {level} and more are replaced, JSON on its stdin",
+    )
+    parser.add_argument(
+        "--post", action="append", default=[], metavar="URL", help="post JSON to it"
+    )
+    parser.add_argument(
+        "--sound",
+        metavar="PLAYER",
+        help="play a WAV file with it until acknowledged, such as 'aplay -q'; or: bell",
+    )
+    parser.add_argument(
+        "--timeout", type=_positive, default=5.0, help="of each try, in seconds (default 5)"
+    )
+    parser.add_argument(
+        "--per-minute",
+        type=_positive,
+        default=60.0,
+        help="what each command and URL may get in the long run (default 60)",
+    )
 
 
 def _model_actions(model: argparse.ArgumentParser) -> None:
@@ -250,13 +355,36 @@ def _model_actions(model: argparse.ArgumentParser) -> None:
 def _site(parser: argparse.ArgumentParser, *, connect: bool = False) -> None:
     parser.add_argument("site", help="site file (YAML)")
     if connect:
-        parser.add_argument(
-            "--connect",
-            action="append",
-            default=[],
-            metavar="ENDPOINT",
-            help="Zenoh endpoint instead of the site file's, such as tcp/127.0.0.1:7447",
-        )
+        _connect(parser)
+
+
+def _dashboard_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("site", nargs="+", help="site files (YAML), one per machine")
+    _connect(parser)
+    parser.add_argument("--host", default="127.0.0.1", help="to listen on (default 127.0.0.1)")
+    parser.add_argument("--port", type=_port, default=8080, help="0: any free (default 8080)")
+    parser.set_defaults(command=_dashboard)
+
+
+def _connect(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--connect",
+        action="append",
+        default=[],
+        metavar="ENDPOINT",
+        help="Zenoh endpoint instead of the site file's, such as tcp/127.0.0.1:7447",
+    )
+
+
+def _alert_requests(ack: argparse.ArgumentParser, shelve: argparse.ArgumentParser) -> None:
+    for parser, who in ((ack, "who has seen it"), (shelve, "who wants it silent")):
+        _site(parser, connect=True)
+        parser.add_argument("alert", help="its alert_id")
+        parser.add_argument("--who", required=True, help=who)
+    ack.set_defaults(command=_ack)
+    text = "for how long; 0 ends its silence"
+    shelve.add_argument("--for", type=_seconds, required=True, metavar="SECONDS", help=text)
+    shelve.set_defaults(command=_shelve)
 
 
 def _operator(parser: argparse.ArgumentParser) -> None:
@@ -264,10 +392,24 @@ def _operator(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--operator", metavar="NAME", help=text)
 
 
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not 0.0 <= value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not 0 or above")
+    return value
+
+
 def _positive(text: str) -> float:
     value = float(text)
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is not above 0")
+    return value
+
+
+def _port(text: str) -> int:
+    value = int(text)
+    if not 0 <= value <= 65535:  # noqa: PLR2004 - what TCP has
+        raise argparse.ArgumentTypeError(f"{value} is no port")
     return value
 
 

@@ -9,6 +9,7 @@
     ├── LogError             a recording that cannot be replayed: file, line, column
     ├── ModelFileError       kept models that cannot be read, written or found: file and reason
     ├── InterruptedReplayError  a replay was stopped before its end: no score
+    ├── RefusedError         a request that the guard will not grant: what and why
     └── ConnectionFailedError  no router answered, or the session was refused
 
 Each is printed to a user as one message without a traceback, and ends a command with exit
@@ -52,6 +53,10 @@ class ModelFileError(RampeGuardError):
 
 class InterruptedReplayError(RampeGuardError):
     """A replay was stopped before its end; half a replay has no score."""
+
+
+class RefusedError(RampeGuardError):
+    """A request that the guard will not grant; the message says why, with the limit it broke."""
 
 
 class ConnectionFailedError(RampeGuardError):

@@ -1,7 +1,8 @@
 """All alerts of a machine: one alarm per zone and one for the system itself.
 
 Turns evidence into published alerts: transitions at once, repeats while active, and frozen
-repeats marked stale while the guard cannot see.
+repeats marked stale while the guard cannot see. Alarms of zones live by the machine's time;
+what people ask for (shelving) goes by the guard's own clock, which never stands still.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from rampe_guard.core.alarm import Alarm, Level
+from rampe_guard.core.alarm import Alarm, Inhibit, Level, urgency
 from rampe_guard.core.config import AlertConfig
 from rampe_guard.core.events import (
     SYSTEM_ZONE,
@@ -19,6 +20,7 @@ from rampe_guard.core.events import (
     Quality,
 )
 from rampe_guard.core.types import Certificate
+from rampe_guard.errors import RefusedError
 
 _CALM = Evidence(Level.CLEAR, "system", None, None, None)
 
@@ -55,7 +57,7 @@ class Annunciator:
         self._published_s: dict[str, float] = {}
         self._raised_s: dict[str, float] = {}
         self._changed_s: dict[str, float] = {}
-        self._stale = False
+        self._stale = self._off = False
         self.seq = 0
 
     def shown(self, zone: str) -> Level:
@@ -82,6 +84,27 @@ class Annunciator:
         zones = [z for z, a in self._alarms.items() if a.active and z != SYSTEM_ZONE]
         return [self._event(z, "repeat", moment) for z in zones if first or self._due(z, moment)]
 
+    def switch_off(self, moment: Moment) -> list[AlertEvent]:
+        """The machine is off: alerts of zones return, and none is raised until `switch_on`."""
+        self._off, self._stale = True, False
+        events = []
+        for zone, alarm in self._alarms.items():
+            if zone != SYSTEM_ZONE and alarm.switch_off(_clock(zone, moment)):
+                events.append(self._changed(zone, moment))
+        return [*events, *self.repeats(moment)]
+
+    def switch_on(self) -> None:
+        """The machine is on."""
+        if self._off:
+            self._off = False
+            for alarm in self._alarms.values():
+                alarm.switch_on()
+
+    def lapse(self, moment: Moment) -> list[AlertEvent]:
+        """End every shelving whose time is up, whether or not the guard can see."""
+        over = [zone for zone, alarm in self._alarms.items() if alarm.lapse(moment.now_s)]
+        return [self._changed(zone, moment) for zone in over]
+
     def repeats(self, moment: Moment) -> list[AlertEvent]:
         """Repeats that are due for active alerts."""
         active = [z for z, a in self._alarms.items() if a.active]
@@ -89,17 +112,37 @@ class Annunciator:
 
     def acknowledge(self, alert_id: str, who: str, moment: Moment) -> list[AlertEvent]:
         """Acknowledge an alert by its id; empty if there is none of that id to acknowledge."""
-        for zone, alarm in self._alarms.items():
-            if self._id(zone) == alert_id and alarm.acknowledge(who, _clock(zone, moment)):
-                self._changed_s[zone] = moment.now_s
-                return [self._event(zone, "transition", moment)]
-        return []
+        zone = self._zone(alert_id)
+        if zone is None or not self._alarms[zone].acknowledge(who):
+            return []
+        return [self._changed(zone, moment)]
+
+    def shelve(
+        self, alert_id: str, who: str, duration_s: float, moment: Moment
+    ) -> list[AlertEvent]:
+        """Silence an alert for ``duration_s`` from now on; 0 ends its silence.
+
+        Raises:
+            RefusedError: there is no such alert, or it may not be silent (for so long).
+        """
+        zone = self._zone(alert_id)
+        if zone is None:
+            raise RefusedError(f"no alert {alert_id!r} is shown")
+        alarm = self._alarms[zone]
+        if duration_s > 0.0:
+            alarm.shelve(who, duration_s, moment.now_s)
+        elif not alarm.unshelve():
+            raise RefusedError(f"alert {alert_id!r} is not shelved")
+        return [self._changed(zone, moment)]
 
     def active(self, moment: Moment) -> list[AlertEvent]:
-        """All active alerts, for whoever comes late; not counted as published."""
-        return [
+        """All active alerts, the most urgent first, for whoever comes late; not published."""
+        shown = [
             self._build(z, "repeat", moment, self.seq) for z, a in self._alarms.items() if a.active
         ]
+        return sorted(
+            shown, key=lambda e: (*urgency(e.level, e.evidence.time_to_collision_s), e.zone)
+        )
 
     def _one(self, zone: str, found: Evidence, moment: Moment) -> list[AlertEvent]:
         alarm = self._alarms.get(zone)
@@ -116,14 +159,22 @@ class Annunciator:
         if found.level >= alarm.level or zone not in self._evidence:
             self._evidence[zone] = found
         if changed:
-            self._changed_s[zone] = moment.now_s
-            event = self._event(zone, "transition", moment)
-            if not alarm.active:
-                alarm.latched = zone == SYSTEM_ZONE
-            return [event]
+            return [self._changed(zone, moment)]
         if was_active and self._due(zone, moment):
             return [self._event(zone, "repeat", moment)]
         return []
+
+    def _zone(self, alert_id: str) -> str | None:
+        """The zone of an alert that is shown, by its id."""
+        shown = (zone for zone, alarm in self._alarms.items() if alarm.active)
+        return next((zone for zone in shown if self._id(zone) == alert_id), None)
+
+    def _changed(self, zone: str, moment: Moment) -> AlertEvent:
+        self._changed_s[zone] = moment.now_s
+        alarm = self._alarms[zone]
+        if not alarm.active:
+            alarm.latched = zone == SYSTEM_ZONE
+        return self._event(zone, "transition", moment)
 
     def _due(self, zone: str, moment: Moment) -> bool:
         # a hair less than the period, so that a 5 Hz repeat survives rounding of ticks
@@ -156,7 +207,16 @@ class Annunciator:
             raised_s=self._raised_s[zone],
             changed_s=self._changed_s[zone],
             acked_by=alarm.acked_by,
+            inhibit=self._inhibit(alarm),
+            shelved_by=alarm.shelved_by,
+            shelved_until_s=alarm.shelved_until_s,
         )
+
+    def _inhibit(self, alarm: Alarm) -> Inhibit:
+        """The system's own alarm is never suppressed, but without a cause it is off like all."""
+        if self._off and alarm.level is Level.CLEAR:
+            return Inhibit.MACHINE_OFF
+        return alarm.inhibit
 
     def _quality(self, zone: str, found: Evidence, moment: Moment) -> Quality:
         if self._stale and zone != SYSTEM_ZONE:

@@ -133,6 +133,7 @@ class AlertConfig:
         caution_probability: smallest probability of contact that is a caution [-].
         debounce_steps: evaluations in a row before a caution or warning is published.
         imminent_steps: the same for imminent.
+        release_steps: evaluations in a row without a cause before its alert goes.
         off_delay_s: how long a cause must be gone before its alert goes [s].
         min_on_s: shortest life of an alert [s].
         deadband_m: extra clearance that must be regained [m].
@@ -141,12 +142,15 @@ class AlertConfig:
         republish_s: period of repeats while an alert is active [s].
         expires_after_s: age at which a consumer must no longer trust a message [s].
         horizon_s: contacts further away in time than this are a caution at most [s].
+        realarm_s: an alert that goes on asks for attention again after this time [s].
+        shelve_max_s: longest time for which an alert may be shelved [s].
     """
 
     warning_probability: float = 0.5
     caution_probability: float = 0.25
     debounce_steps: int = 2
     imminent_steps: int = 1
+    release_steps: int = 5
     off_delay_s: float = 0.5
     min_on_s: float = 1.0
     deadband_m: float = 0.02
@@ -155,6 +159,8 @@ class AlertConfig:
     republish_s: float = 0.2
     expires_after_s: float = 1.0
     horizon_s: float = 6.0
+    realarm_s: float = 60.0
+    shelve_max_s: float = 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,6 +175,8 @@ class InputConfig:
         position_slack: how far a position may lie beyond its limits [share of the range].
         speed_slack: how many times ``max_velocity`` a measured speed may be [-].
         max_stamp_jump_s: largest step of a stamp beyond the time that really passed [s].
+        enabled_timeout_s: how long the machine's word that it is switched off holds [s]; None
+            if it has no key to say so.
     """
 
     joystick_timeout_s: float = 0.5
@@ -177,6 +185,7 @@ class InputConfig:
     position_slack: float = 0.05
     speed_slack: float = 5.0
     max_stamp_jump_s: float = 1.0
+    enabled_timeout_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

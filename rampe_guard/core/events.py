@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from rampe_guard.core.alarm import Level, State
+from rampe_guard.core.alarm import Inhibit, Level, State
 from rampe_guard.core.types import Category, FloatArray, ZoneSweep
 
 Source: TypeAlias = Literal["stopping", "intent", "next", "contact", "system"]
@@ -69,7 +69,10 @@ class PredictionSummary:
 
 @dataclass(frozen=True, slots=True)
 class AlertEvent:
-    """An alert to publish: a transition, or a repeat of one that is active."""
+    """An alert to publish: a transition, or a repeat of one that is active.
+
+    Times are on the clock of ``now_s`` [s], but for ``stamp_s``.
+    """
 
     kind: Literal["transition", "repeat"]
     alert_id: str
@@ -87,6 +90,9 @@ class AlertEvent:
     raised_s: float
     changed_s: float
     acked_by: str | None
+    inhibit: Inhibit = Inhibit.NONE
+    shelved_by: str | None = None
+    shelved_until_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

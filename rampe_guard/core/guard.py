@@ -4,7 +4,8 @@ Each step takes every sample that arrived, in stamp order, and lets it update th
 intention and the arm's motion. Then, if a new position came, the newest state is swept once
 for each forecast, judged zone by zone, and alarmed. Objects that move are swept where they
 are now, and at least ten times a second, since they come nearer to an arm that stands too. Any
-other step only lets time pass: silence is noticed, active alerts are repeated.
+other step only lets time pass: silence is noticed, active alerts are repeated. While the machine
+is switched off, nothing is swept and alerts of zones are suppressed.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 from rampe_guard.core.alarm import Level
 from rampe_guard.core.annunciator import Annunciator, Moment
 from rampe_guard.core.config import GuardConfig
+from rampe_guard.core.enabled import EnableKey
 from rampe_guard.core.events import (
     SYSTEM_ZONE,
     AlertEvent,
@@ -29,7 +31,7 @@ from rampe_guard.core.events import (
     SweepSummary,
 )
 from rampe_guard.core.forecast import Forecast, Forecaster, StoppingForecast
-from rampe_guard.core.inputs import Accepted, InputGate, Rejection
+from rampe_guard.core.inputs import Accepted, Fault, InputGate, Rejection
 from rampe_guard.core.intention import Intention
 from rampe_guard.core.levels import LevelRules, worst
 from rampe_guard.core.monitor import Health, InputMonitor, Status
@@ -39,6 +41,7 @@ from rampe_guard.core.scene import SolidObject
 from rampe_guard.core.types import (
     ActuatorSample,
     Certificate,
+    EnabledSample,
     FloatArray,
     InputName,
     Inputs,
@@ -95,6 +98,8 @@ class Guard:
         self._sweeper = sweeper
         self._gate = InputGate(config.actuators, limits, config.inputs, config.axes)
         self._monitor = InputMonitor(config.inputs, start_s)
+        self._enable = EnableKey(config.actuators, config.inputs, start_s)
+        self._off = False
         self._moving = MovingObjects(moving, config.inputs)
         self._intention = Intention(config, limits)
         self._velocity = VelocityEstimator(np.array([a.max_velocity for a in config.actuators]))
@@ -134,10 +139,15 @@ class Guard:
         fresh, refused = self._moving.take(inputs, now_s)
         events += refused
         self._poses_came |= fresh
+        events += self._switch(inputs.enabled, now_s)
         health = self._health(now_s)
         moment = self._moment(health, now_s)
+        events += self._annunciator.lapse(moment)
         events += self._annunciator.system(_system_evidence(health, self._restarted), moment)
-        if health.status is Status.NOT_MONITORING:
+        if health.off:
+            self._intention.interrupt()
+            events += self._annunciator.switch_off(moment)
+        elif health.status is Status.NOT_MONITORING:
             self._intention.interrupt()
             events += self._annunciator.freeze(moment)
         elif self._newest is not None and (self._newest is not before or self._must_look(now_s)):
@@ -146,13 +156,24 @@ class Guard:
             events += self._annunciator.repeats(moment)
         return tuple(events)
 
-    def acknowledge(self, alert_id: str, who: str, now_s: float) -> tuple[Event, ...]:
+    def acknowledge(self, alert_id: str, who: str, now_s: float) -> tuple[AlertEvent, ...]:
         """Someone has seen an alert; empty if no alert of that id waits for it."""
         moment = self._moment(self._health(now_s), now_s)
         events = self._annunciator.acknowledge(alert_id, who, moment)
         if any(event.zone == SYSTEM_ZONE for event in events):
             self._restarted = None
         return tuple(events)
+
+    def shelve(
+        self, alert_id: str, who: str, duration_s: float, now_s: float
+    ) -> tuple[AlertEvent, ...]:
+        """Someone wants an alert to be silent for ``duration_s`` [s]; 0 ends its silence.
+
+        Raises:
+            RefusedError: there is no such alert, or it may not be silent (for so long).
+        """
+        moment = self._moment(self._health(now_s), now_s)
+        return tuple(self._annunciator.shelve(alert_id, who, duration_s, moment))
 
     def snapshot(self, now_s: float) -> Snapshot:
         """The present state."""
@@ -183,6 +204,7 @@ class Guard:
             return [RefusalEvent(moved.input, moved.reason, moved.detail)]
         self._monitor.accept("actuators", sample.arrival_s)
         self._moving.follow(sample, restarted=moved.restarted)
+        self._enable.moved(sample, restarted=moved.restarted)
         self._restart(moved)
         if self._newest is not None and not moved.restarted:
             self._machine_s += moved.sample.stamp_s - self._newest.stamp_s
@@ -190,6 +212,24 @@ class Guard:
         self._velocity.update(moved.sample)
         v = self._velocity.velocity
         return [*self._intention.actuators(moved.sample, v, now_s, learn=learn)]
+
+    def _switch(self, words: tuple[EnabledSample, ...], now_s: float) -> list[RefusalEvent]:
+        """Take what the enable key says, and see whether the machine is off now."""
+        refused = []
+        for word in words:
+            verdict = self._enable.take(word)
+            if isinstance(verdict, Fault):
+                self._monitor.reject("enabled", verdict.reason, now_s)
+                refused.append(RefusalEvent("enabled", verdict.reason, verdict.detail))
+            else:
+                self._monitor.accept("enabled", word.arrival_s)
+        if self._monitor.lever_known(now_s):
+            self._enable.pushed(self._intention.command, now_s)
+        was_off, self._off = self._off, self._enable.off(now_s)
+        if was_off and not self._off:
+            self._monitor.switched_on(now_s)
+            self._annunciator.switch_on()
+        return refused
 
     def _taught(self, events: list[Event]) -> list[Event]:
         for event in events:
@@ -199,7 +239,10 @@ class Guard:
 
     def _refuse(self, name: InputName, reason: str, now_s: float) -> None:
         self._monitor.reject(name, reason, now_s)
-        self._intention.interrupt()
+        if name == "enabled":
+            self._enable.refused()
+        else:
+            self._intention.interrupt()
 
     def _restart(self, accepted: Accepted[JoystickSample] | Accepted[ActuatorSample]) -> None:
         if accepted.restarted:
@@ -254,10 +297,9 @@ class Guard:
         return bool(self._moving) and since_s >= (_FRESH_S if self._poses_came else _LOOK_S)
 
     def _health(self, now_s: float) -> Health:
-        if not self._moving:
-            return self._monitor.health(now_s)
-        health = self._monitor.health(now_s, self._moving.weaknesses(now_s))
-        return replace(health, objects=self._moving.health(now_s))
+        more = [*self._enable.weaknesses(now_s), *self._moving.weaknesses(now_s)]
+        health = self._monitor.health(now_s, more, off=self._off)
+        return replace(health, objects=self._moving.health(now_s)) if self._moving else health
 
     def _sharper(
         self,
@@ -306,6 +348,6 @@ def _system_evidence(health: Health, restarted: str | None) -> Evidence:
     """What there is to say of the guard itself; a restart stays until it is acknowledged."""
     notes = [f"guard restarted after {restarted}"] if restarted else []
     level = Level.CAUTION if notes else Level.CLEAR
-    if health.status is Status.NOT_MONITORING and not health.starting:
+    if health.status is Status.NOT_MONITORING and not (health.starting or health.off):
         level, notes = Level.WARNING, [*(r.text for r in health.reasons), *notes]
     return Evidence(level, "system", None, None, None, "; ".join(notes))

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rampe_guard.core.alarm import Level
+from rampe_guard.core.alarm import Level, urgency
 from rampe_guard.core.config import AlertConfig
 from rampe_guard.core.events import Evidence, Source
 from rampe_guard.core.forecast import Forecast, IntentForecast, StoppingForecast
@@ -65,7 +65,8 @@ class LevelRules:
         if probability >= alerts.warning_probability - slack(Level.WARNING, band):
             if time_s <= stop_s + slack(Level.IMMINENT, alerts.deadband_s):
                 return Level.IMMINENT
-            return Level.WARNING if time_s <= alerts.horizon_s else Level.CAUTION
+            near = time_s <= alerts.horizon_s + slack(Level.WARNING, alerts.deadband_s)
+            return Level.WARNING if near else Level.CAUTION
         if probability >= alerts.caution_probability - slack(Level.CAUTION, band):
             return Level.CAUTION
         return Level.CLEAR
@@ -86,14 +87,10 @@ class LevelRules:
 
 def worst(items: list[Evidence]) -> Evidence:
     """The most urgent evidence; among equals the soonest."""
-    return min(items, key=lambda e: (-e.level, _or_inf(e.time_to_collision_s)))
+    return min(items, key=lambda e: urgency(e.level, e.time_to_collision_s))
 
 
 def _source(forecast: Forecast, sweep: ZoneSweep) -> Source:
     if sweep.inside:
         return "contact"
     return "intent" if isinstance(forecast, IntentForecast) else "stopping"
-
-
-def _or_inf(value: float | None) -> float:
-    return float("inf") if value is None else value

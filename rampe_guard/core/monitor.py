@@ -3,7 +3,8 @@
 ``ok``              both inputs are fresh and plausible
 ``degraded``        monitoring, but something is not as it should be (with reasons)
 ``not_monitoring``  an input is missing or too old, or the machine computes what is not so:
-                    nothing that is shown can be trusted
+                    nothing that is shown can be trusted; or the machine is switched off, and
+                    there is nothing to guard
 """
 
 from __future__ import annotations
@@ -74,6 +75,7 @@ class Health:
     """Status with its reasons, and the age of the newest good sample of each input [s].
 
     ``starting``: not monitoring only because the first samples may still be on their way.
+    ``off``: not monitoring only because the machine is switched off.
     """
 
     status: Status
@@ -82,6 +84,7 @@ class Health:
     accepted: dict[InputName, int]
     rejected: dict[tuple[InputName, str], int]
     starting: bool = False
+    off: bool = False
     objects: tuple[ObjectHealth, ...] = ()
 
 
@@ -109,15 +112,17 @@ class InputMonitor:
 
     def accept(self, name: InputName, arrival_s: float) -> None:
         """A good sample arrived."""
-        self._last_s[name] = arrival_s
         self._accepted[name] += 1
-        self._note(arrival_s, good=True)
+        if name != "enabled":  # which says nothing of where the machine is
+            self._last_s[name] = arrival_s
+            self._note(arrival_s, good=True)
 
     def reject(self, name: InputName, reason: str, now_s: float) -> None:
         """A message was refused."""
         self._rejected[name, reason] += 1
         self._recent[name, reason] = now_s
-        self._note(now_s, good=False)
+        if name != "enabled":
+            self._note(now_s, good=False)
 
     def sweep_unknown(self, now_s: float) -> None:
         """A sweep ended without an answer."""
@@ -133,6 +138,14 @@ class InputMonitor:
     def distrust(self, fault: str) -> None:
         """The machine computed wrongly: nothing it says is to be trusted until it starts anew."""
         self._distrust = self._distrust or fault
+
+    def switched_on(self, now_s: float) -> None:
+        """The machine is on again: its inputs may take as long to come as at the start."""
+        self._start_s = now_s
+
+    def lever_known(self, now_s: float) -> bool:
+        """Whether the newest joystick sample says how the lever stands now."""
+        return self._last_s["joystick"] is not None and self._joystick(now_s) is None
 
     def joystick_alive(self, alive: bool | None) -> None:
         """What the joystick's liveliness token says; None without a token."""
@@ -150,28 +163,45 @@ class InputMonitor:
         self._window.append((at_s, good))
         self._bad += not good
 
-    def health(self, now_s: float, more: Sequence[Reason] = ()) -> Health:
-        """Status at ``now_s``; ``more`` are weaknesses that others have found."""
+    def health(self, now_s: float, more: Sequence[Reason] = (), *, off: bool = False) -> Health:
+        """Status at ``now_s``.
+
+        Args:
+            now_s: now.
+            more: weaknesses that others have found.
+            off: the machine is switched off: its silence is no fault, nor anything else of it.
+        """
+        if off and self._distrust is None:
+            reason = Reason("machine_off", "enabled", "the machine is switched off")
+            return self._told(Status.NOT_MONITORING, [reason], now_s, off=True)
         silent = [r for r in (self._silence("actuators", now_s), self._joystick(now_s)) if r]
         blind = [*self._distrusted(), *silent]
         weak = [*more, *self._weaknesses(now_s)]
         status = Status.NOT_MONITORING if blind else Status.DEGRADED if weak else Status.OK
+        starting = bool(silent) and self._distrust is None and self._starting(now_s)
+        return self._told(status, [*blind, *weak], now_s, starting=starting)
+
+    def _told(
+        self,
+        status: Status,
+        reasons: Sequence[Reason],
+        now_s: float,
+        *,
+        starting: bool = False,
+        off: bool = False,
+    ) -> Health:
         ages: dict[InputName, float | None] = {
             name: None if last is None else max(now_s - last, 0.0)
             for name, last in self._last_s.items()
         }
+        counts = dict(self._accepted), dict(self._rejected)
+        return Health(status, tuple(reasons), ages, *counts, starting=starting, off=off)
+
+    def _starting(self, now_s: float) -> bool:
+        """No sample came since monitoring began, which is not long ago."""
         limit = max(self._config.joystick_timeout_s, self._config.actuators_timeout_s)
-        return Health(
-            status,
-            (*blind, *weak),
-            ages,
-            dict(self._accepted),
-            dict(self._rejected),
-            starting=bool(silent)
-            and self._distrust is None
-            and not self._accepted
-            and now_s - self._start_s <= limit,
-        )
+        came = any(last is not None and last >= self._start_s for last in self._last_s.values())
+        return not came and now_s - self._start_s <= limit
 
     def _distrusted(self) -> list[Reason]:
         if self._distrust is None:

@@ -20,7 +20,7 @@ Indices: TypeAlias = npt.NDArray[np.intp]
 Category: TypeAlias = tuple[int, ...]
 """Ω: one sign in {-1, 0, +1} per actuator."""
 Point: TypeAlias = tuple[float, float, float]
-InputName: TypeAlias = Literal["joystick", "actuators"]
+InputName: TypeAlias = Literal["joystick", "actuators", "enabled"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +40,19 @@ class ActuatorSample:
     position: FloatArray
     velocity: FloatArray | None
     arrival_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class EnabledSample:
+    """One message of the enable key: whether the machine says that it is switched on.
+
+    Not ``stamped``: the message had no stamp, and ``stamp_s`` is its arrival.
+    """
+
+    enabled: bool
+    stamp_s: float
+    arrival_s: float
+    stamped: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +90,7 @@ class Inputs:
     ``joystick_alive`` is what the joystick's liveliness token says, None without a token.
     ``canary`` says what this machine computed wrongly when it was tried, and ``restarted`` after
     what the guard was started anew; both are None where there is nothing to say.
+    ``enabled`` is what came on the enable key.
     """
 
     joystick: tuple[JoystickSample, ...] = ()
@@ -87,6 +101,7 @@ class Inputs:
     objects_rejected: tuple[tuple[str, str], ...] = ()
     canary: str | None = None
     restarted: str | None = None
+    enabled: tuple[EnabledSample, ...] = ()
 
 
 class Certificate(StrEnum):

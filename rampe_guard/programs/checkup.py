@@ -75,6 +75,8 @@ def _keys(site: Site) -> Table:
     table = _table("keys and files", "what", "where")
     table.add_row("joystick", site.keys.joystick)
     table.add_row("actuators", site.keys.actuators)
+    if site.keys.enabled is not None:
+        table.add_row("switched on or off", site.keys.enabled)
     for item in site.scene.moving:
         table.add_row(f"poses of {item.name}", item.key)
     table.add_row("published under", site.keys.base)

@@ -62,6 +62,7 @@ def demo(cycles: int, seed: int, console: Console, stop: StopFlag) -> int:
         work = ["-m", "rampe_guard.simulate.process", "--connect", endpoint]
         operator = start("operator", [*work, "--cycles", str(cycles), "--seed", str(seed)])
         console.print("router, guard and operator are starting; the quarry is being loaded …")
+        console.print(f"anyone may listen: --connect {endpoint}", highlight=False, soft_wrap=True)
         machine = stop.unless_stopped(lambda: load_telling(site, console.print))
         if machine is None:
             return 0

@@ -123,12 +123,13 @@ class Pulse:
     ) -> wire.Heartbeat:
         """A heartbeat; ``extra`` are reasons that only the daemon knows (no router, say)."""
         self._seq += 1
-        keys = {"joystick": self.site.keys.joystick, "actuators": self.site.keys.actuators}
+        own = self.site.keys
+        keys = {"joystick": own.joystick, "actuators": own.actuators, "enabled": own.enabled}
         reasons = [
             wire.Reason(code=r.code, text=r.text, key=keys[r.input] if r.input else r.key)
             for r in health.reasons
         ]
-        more = list(extra)
+        more = [] if health.off else list(extra)  # what is off has no other weakness
         status = Status.DEGRADED if more and health.status is Status.OK else health.status
         rejected: dict[str, dict[str, int]] = {}
         for (name, reason), count in health.rejected.items():

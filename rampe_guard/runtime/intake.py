@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from rampe_guard import wire
 from rampe_guard.core.types import (
     ActuatorSample,
+    EnabledSample,
     FloatArray,
     InputName,
     Inputs,
@@ -21,7 +22,7 @@ from rampe_guard.settings import Site
 
 
 class Intake:
-    """Both inputs of a machine and the poses of objects that move, drained by the worker."""
+    """The inputs of a machine and the poses of objects that move, drained by the worker."""
 
     def __init__(self, bus: Bus, site: Site, say: Sayer) -> None:
         keys = site.keys
@@ -29,6 +30,7 @@ class Intake:
         self._say = say
         self._joystick = bus.inbox(keys.joystick)
         self._actuators = bus.inbox(keys.actuators)
+        self._enabled = None if keys.enabled is None else bus.inbox(keys.enabled)
         self._objects = [
             (item.name, item.key, bus.inbox(item.key))
             for item in site.scene.moving
@@ -39,7 +41,9 @@ class Intake:
     @property
     def overruns(self) -> int:
         """How often an input came faster than it was drained."""
-        inboxes = (self._joystick, self._actuators, *(inbox for _, _, inbox in self._objects))
+        inboxes = [self._joystick, self._actuators, *(inbox for _, _, inbox in self._objects)]
+        if self._enabled is not None:
+            inboxes.append(self._enabled)
         return sum(inbox.overruns for inbox in inboxes)
 
     def collect(self, now_s: float) -> Inputs:
@@ -64,7 +68,23 @@ class Intake:
                 self._refuse("actuators", message, error, refused)
         alive = None if self._alive is None else self._alive.poll()
         poses, lost = self._poses(now_s)
-        return Inputs(tuple(levers), tuple(positions), tuple(refused), alive, poses, lost)
+        words = self._words(now_s, refused)
+        return Inputs(
+            tuple(levers), tuple(positions), tuple(refused), alive, poses, lost, enabled=words
+        )
+
+    def _words(
+        self, now_s: float, refused: list[tuple[InputName, str]]
+    ) -> tuple[EnabledSample, ...]:
+        """What came on the enable key, if there is one."""
+        words = []
+        for message in [] if self._enabled is None else self._enabled.drain():
+            try:
+                _exact(message, self._site.keys.enabled or "")
+                words.append(_said(wire.decode_enabled(message.payload), now_s))
+            except MessageError as error:
+                self._refuse("enabled", message, error, refused)
+        return tuple(words)
 
     def _poses(self, now_s: float) -> tuple[tuple[ObjectSample, ...], tuple[tuple[str, str], ...]]:
         """Poses of all objects that move, and (object, reason) of what was refused."""
@@ -105,6 +125,11 @@ class Intake:
 
     def _warn(self, kind: str, message: Message, error: MessageError) -> None:
         self._say.warn(kind, f"{message.key}: refused: {error}")
+
+
+def _said(message: wire.EnabledMessage, now_s: float) -> EnabledSample:
+    stamp_s = now_s if message.stamp is None else message.stamp
+    return EnabledSample(message.enabled, stamp_s, now_s, stamped=message.stamp is not None)
 
 
 def _placed(name: str, message: wire.ObjectPose, now_s: float) -> ObjectSample:

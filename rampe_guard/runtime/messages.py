@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rampe_guard import wire
-from rampe_guard.core.alarm import Level, State
+from rampe_guard.core.alarm import Inhibit, Level, State
 from rampe_guard.core.events import (
     SYSTEM_ZONE,
     AlertEvent,
@@ -51,7 +51,7 @@ class Scribe:
             site=self.site.name,
             machine=self.site.machine,
             source=found.source,
-            inhibit="none",
+            inhibit=event.inhibit.value,
             quality=event.quality,
             zone=zone,
             link=link,
@@ -73,6 +73,8 @@ class Scribe:
             raised_unix_s=self.unix_s(event.raised_s),
             changed_unix_s=self.unix_s(event.changed_s),
             acked_by=event.acked_by,
+            shelved_by=event.shelved_by,
+            shelved_until_unix_s=self._unix_or_none(event.shelved_until_s),
             expires_after_s=self.site.guard.alerts.expires_after_s,
             text=wire.alert_text(
                 link,
@@ -80,6 +82,7 @@ class Scribe:
                 found.time_to_collision_s,
                 event.level.word,
                 found.source,
+                machine_off=event.inhibit is Inhibit.MACHINE_OFF,
             ),
         )
 
@@ -116,6 +119,9 @@ class Scribe:
             predictions=() if prediction is None else (prediction,),
             position=self._by_name(snapshot.position),
         )
+
+    def _unix_or_none(self, now_s: float | None) -> float | None:
+        return None if now_s is None else self.unix_s(now_s)
 
     def _told(self, told: PredictionSummary) -> dict[str, Any]:
         return {

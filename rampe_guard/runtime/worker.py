@@ -19,7 +19,7 @@ from rampe_guard import wire
 from rampe_guard.assembly import Machine
 from rampe_guard.core.events import AlertEvent, Event, PredictionEvent
 from rampe_guard.core.types import Inputs
-from rampe_guard.errors import MessageError
+from rampe_guard.errors import MessageError, RefusedError
 from rampe_guard.runtime.canary_watch import CanaryWatch
 from rampe_guard.runtime.health import Pulse, TimedSweeper
 from rampe_guard.runtime.intake import Intake
@@ -77,6 +77,7 @@ class Worker:
         self._beats = bus.outbox(f"{base}/heartbeat", "rampe.heartbeat.v1", urgent=True)
         self._states = bus.desk(f"{base}/state")
         self._acks = bus.desk(f"{base}/ack")
+        self._shelves = bus.desk(f"{base}/shelve")
         bus.declare_alive(f"{base}/alive")
         self._prediction: wire.Prediction | None = None
         self._status: str | None = None
@@ -124,16 +125,21 @@ class Worker:
 
     def _publish(self, event: Event, compute_ms: float | None) -> None:
         if isinstance(event, AlertEvent):
-            message = self._scribe.alert(event, compute_ms)
-            self._alerts.put(wire.encode(message))
-            if event.kind == "transition":
-                self._say.info(f"{message.level}: {message.text}")
+            self._publish_alert(event, compute_ms)
         elif isinstance(event, PredictionEvent):
             self._prediction = self._scribe.prediction(event)
             self._predictions.put(wire.encode(self._prediction))
         else:
             kind = f"{event.input}:{event.reason}"
             self._say.warn(kind, f"{event.input}: refused: {event.reason}: {event.detail}")
+
+    def _publish_alert(self, event: AlertEvent, compute_ms: float | None) -> bytes:
+        message = self._scribe.alert(event, compute_ms)
+        payload = wire.encode(message)
+        self._alerts.put(payload)
+        if event.kind == "transition":
+            self._say.info(f"{message.level}: {message.text}")
+        return payload
 
     def _beat(self, now_s: float) -> None:
         self._pulse.tick += 1
@@ -168,30 +174,46 @@ class Worker:
             state = self._scribe.state(self._heartbeat, snapshot, self._prediction)
             request.reply(wire.encode(state))
         for request in self._acks.drain():
-            self._acknowledge(request, now_s)
+            self._grant(request, self._acknowledge, now_s)
+        for request in self._shelves.drain():
+            self._grant(request, self._shelve, now_s)
 
-    def _acknowledge(self, request: Request, now_s: float) -> None:
+    def _grant(
+        self,
+        request: Request,
+        do: Callable[[bytes, float], tuple[AlertEvent, ...]],
+        now_s: float,
+    ) -> None:
+        """Do what somebody wants of an alert, and answer with the alert, or say why not."""
         try:
-            ack = wire.decode(request.payload or b"", wire.Ack, limit=wire.MAX_PAYLOAD_BYTES)
-        except MessageError as error:
+            events = do(request.payload or b"", now_s)
+        except (MessageError, RefusedError) as error:
             request.refuse(str(error))
             return
+        for event in events:
+            request.reply(self._publish_alert(event, None))
+
+    def _acknowledge(self, payload: bytes, now_s: float) -> tuple[AlertEvent, ...]:
+        ack = wire.decode(payload, wire.Ack, limit=wire.MAX_PAYLOAD_BYTES)
         events = self._guard.acknowledge(ack.alert_id, ack.who, now_s)
         if not events:
-            request.refuse(f"no alert {ack.alert_id!r} waits for an acknowledgement")
-            return
+            raise RefusedError(f"no alert {ack.alert_id!r} waits for an acknowledgement")
         self._say.info(f"{ack.alert_id} acknowledged by {ack.who}")
-        for event in events:
-            self._publish(event, None)
-            if isinstance(event, AlertEvent):
-                request.reply(wire.encode(self._scribe.alert(event)))
+        return events
+
+    def _shelve(self, payload: bytes, now_s: float) -> tuple[AlertEvent, ...]:
+        wish = wire.decode(payload, wire.Shelve, limit=wire.MAX_PAYLOAD_BYTES)
+        events = self._guard.shelve(wish.alert_id, wish.who, wish.duration_s, now_s)
+        how = f"shelved for {wish.duration_s:g} s" if wish.duration_s else "no longer shelved"
+        self._say.info(f"{wish.alert_id} {how} by {wish.who}")
+        return events
 
 
 def arrived(inputs: Inputs) -> bool:
     """Anything at all came, good or refused, from outside or of this machine itself."""
     lists = (inputs.joystick, inputs.actuators, inputs.rejected)
     news = (inputs.canary, inputs.restarted)
-    return any((*lists, inputs.objects, inputs.objects_rejected, *news))
+    return any((*lists, inputs.objects, inputs.objects_rejected, inputs.enabled, *news))
 
 
 def _unix_s(now_s: float) -> float:

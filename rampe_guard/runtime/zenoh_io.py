@@ -24,6 +24,9 @@ _TRY_MS = 1000
 """One attempt to connect; longer ones cannot be interrupted by a signal."""
 _TOKEN_GRACE_S = 1.0
 """Existing tokens are told of within milliseconds after the subscription."""
+_QUEUE = 16
+"""Messages that may wait for a link, of each priority: Zenoh's most. Its default of 2 drops alerts
+of a third zone in the same step when the sending thread is late by a millisecond."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +80,50 @@ class Liveness:
         if self.alive is None and time.monotonic() >= self._known_at_s:
             self.alive = False
         return self.alive
+
+
+class Tokens:
+    """Liveliness tokens that appear and go on a key expression; those that exist come first."""
+
+    def __init__(self, session: zenoh.Session, key: str) -> None:
+        self._subscriber = session.liveliness().declare_subscriber(
+            key, zenoh.handlers.RingChannel(4096), history=True
+        )
+
+    def drain(self) -> list[tuple[str, bool]]:
+        """Keys of tokens, and whether each appeared; oldest first; never blocks."""
+        changes = []
+        while (sample := self._subscriber.try_recv()) is not None:
+            changes.append((str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT))
+        return changes
+
+
+class Inquiry:
+    """A question to everyone whose queryable matches a key expression, answered bit by bit."""
+
+    def __init__(self, session: zenoh.Session, key: str, timeout_s: float) -> None:
+        # no ring: that forgets what waits in it as soon as the last answer has come
+        self._replies = session.get(
+            key,
+            zenoh.handlers.FifoChannel(4096),
+            target=zenoh.QueryTarget.ALL,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            timeout=timeout_s,
+        )
+        self.done = False
+        """All have answered, or the time is over."""
+
+    def drain(self) -> list[Message]:
+        """Answers that arrived since the last look; errors are left out; never blocks."""
+        answers = []
+        try:
+            while (reply := self._replies.try_recv()) is not None:
+                if reply.ok is not None:
+                    key = str(reply.ok.key_expr)
+                    answers.append(Message(key, reply.ok.payload.to_bytes()))
+        except zenoh.ZError:  # the channel is empty, and closed
+            self.done = True
+        return answers
 
 
 class Outbox:
@@ -204,6 +251,14 @@ class Bus:
         """Watch the liveliness token on a key."""
         return Liveness(self._session, key)
 
+    def tokens(self, key: str) -> Tokens:
+        """Watch all liveliness tokens on a key expression."""
+        return Tokens(self._session, key)
+
+    def inquire(self, key: str, timeout_s: float = 1.0) -> Inquiry:
+        """Query everyone on a key expression, without waiting."""
+        return Inquiry(self._session, key, timeout_s)
+
     def is_alive(self, key: str) -> bool:
         """Whether anybody holds a liveliness token on a key now."""
         replies = self._session.liveliness().get(key, timeout=1.0)
@@ -217,10 +272,15 @@ class Bus:
         """Query a key; returns the answers.
 
         Raises:
-            ConnectionFailedError: the answer was an error (its text is in the message).
+            ConnectionFailedError: the answer was an error (its text is in the message), or the
+                session is closed.
         """
         answers = []
-        for reply in self._session.get(key, payload=payload, timeout=timeout_s):
+        try:
+            replies = self._session.get(key, payload=payload, timeout=timeout_s)
+        except zenoh.ZError as error:  # closed by another thread, say
+            raise ConnectionFailedError(f"{key}: {str(error).split(' at /')[0]}") from None
+        for reply in replies:
             if reply.ok is not None:
                 answers.append(reply.ok.payload.to_bytes())
             elif (
@@ -274,6 +334,19 @@ def check_configuration(settings: ZenohSettings) -> None:
     _config(settings)
 
 
+def check_key_expression(text: str) -> None:
+    """See whether Zenoh takes it for a key expression.
+
+    Raises:
+        SettingsError: it does not.
+    """
+    try:
+        zenoh.KeyExpr(text)
+    except zenoh.ZError as error:
+        reason = str(error).split(" at /")[0].splitlines()[0]
+        raise SettingsError(f"{text!r} is no key expression: {reason}") from None
+
+
 def _config(settings: ZenohSettings) -> zenoh.Config:
     try:
         return _unchecked_config(settings)
@@ -305,4 +378,6 @@ def _blank(mode: Literal["client", "peer", "router"]) -> zenoh.Config:
     config.insert_json5("listen/endpoints", "[]")
     config.insert_json5("scouting/multicast/enabled", "false")
     config.insert_json5("scouting/gossip/enabled", "false")
+    for priority in ("real_time", "data"):
+        config.insert_json5(f"transport/link/tx/queue/size/{priority}", str(_QUEUE))
     return config

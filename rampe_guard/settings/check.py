@@ -21,6 +21,11 @@ def check(model: SiteModel, problems: Problems) -> None:
     if model.alerts.caution_probability > model.alerts.warning_probability:
         what = f"{model.alerts.caution_probability:g} is greater than warning_probability"
         problems.add(("alerts", "caution_probability"), what, "give at most that probability")
+    if model.alerts.expires_after_s < 2.0 * model.alerts.republish_s:
+        what = f"{model.alerts.expires_after_s:g} s is less than two periods of republish_s"
+        problems.add(
+            ("alerts", "expires_after_s"), what, "let an alert outlive the loss of one repeat"
+        )
     _rampe(model, problems)
     _actuators(model.arm, problems)
     _linkages(model.arm, problems)
@@ -35,6 +40,8 @@ def _keys(model: SiteModel, problems: Problems) -> None:
         (("keys", "actuators"), model.keys.actuators),
         (("keys", "base"), model.keys.base),
     ]
+    if model.keys.enabled is not None:
+        keys.append((("keys", "enabled"), model.keys.enabled))
     alive: KeyPath = ("inputs", "joystick", "alive_key")
     if model.inputs.joystick.alive_key is not None:
         keys.append((alive, model.inputs.joystick.alive_key))
@@ -57,8 +64,9 @@ def _keys(model: SiteModel, problems: Problems) -> None:
 def used_keys(model: SiteModel) -> dict[str, str]:
     """Every key that means something at a site, and what."""
     used = {f"{model.keys.base}/{word}": "a key of the guard itself" for word in PUBLISHED}
-    for name in ("joystick", "actuators", "base"):
-        used[getattr(model.keys, name)] = f"keys.{name}"
+    for name in ("joystick", "actuators", "base", "enabled"):
+        if (key := getattr(model.keys, name)) is not None:
+            used[key] = f"keys.{name}"
     if model.inputs.joystick.alive_key is not None:
         used[model.inputs.joystick.alive_key] = "inputs.joystick.alive_key"
     return used

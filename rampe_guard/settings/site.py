@@ -66,6 +66,7 @@ class Keys:
     actuators: str
     base: str
     joystick_alive: str | None
+    enabled: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,6 +268,7 @@ def _guard(model: SiteModel) -> GuardConfig:
             position_slack=inputs.position_slack,
             speed_slack=inputs.speed_slack,
             max_stamp_jump_s=inputs.max_stamp_jump_s,
+            enabled_timeout_s=None if model.keys.enabled is None else inputs.enabled.timeout_s,
         ),
         axes=max(a.axis for a in actuators) + 1,
     )

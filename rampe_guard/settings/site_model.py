@@ -47,6 +47,11 @@ class KeysModel(Model):
     joystick: Text = Field(description="The key the joystick is published on.")
     actuators: Text = Field(description="The key the actuator positions are published on.")
     base: Text = Field(description="The prefix of every key that the guard publishes.")
+    enabled: Text | None = Field(
+        default=None,
+        description="The key on which the machine says whether it is switched on; left out: it "
+        "always is.",
+    )
 
 
 class LimitsModel(Model):

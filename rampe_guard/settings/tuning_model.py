@@ -154,6 +154,10 @@ class AlertsModel(Model):
         default=_ALERTS.imminent_steps,
         description="The evaluations in a row before an imminent alert is published.",
     )
+    release_steps: _Steps = Field(
+        default=_ALERTS.release_steps,
+        description="The evaluations in a row without a cause before an alert goes.",
+    )
     off_delay_s: Seconds = Field(
         default=_ALERTS.off_delay_s,
         description="The time a cause must be gone before its alert goes [s].",
@@ -185,6 +189,14 @@ class AlertsModel(Model):
         default=_ALERTS.horizon_s,
         description="The time to contact beyond which an alert is a caution at most [s].",
     )
+    realarm_s: Annotated[float, Field(ge=5.0, le=3600.0)] = Field(
+        default=_ALERTS.realarm_s,
+        description="The time after which an alert that goes on asks for attention again [s].",
+    )
+    shelve_max_s: Annotated[float, Field(gt=0.0, le=30.0)] = Field(
+        default=_ALERTS.shelve_max_s,
+        description="The longest time for which an alert may be shelved [s].",
+    )
 
 
 class JoystickInputModel(Model):
@@ -213,6 +225,15 @@ class ActuatorsInputModel(Model):
     )
 
 
+class EnabledInputModel(Model):
+    """Supervision of the enable key."""
+
+    timeout_s: _Timeout = Field(
+        default=2.0,
+        description="The age at which the machine's word that it is off no longer holds [s].",
+    )
+
+
 class InputsModel(Model):
     """Limits of plausible input."""
 
@@ -221,6 +242,9 @@ class InputsModel(Model):
     )
     actuators: ActuatorsInputModel = Field(
         default=ActuatorsInputModel(), description="The supervision of the actuator messages."
+    )
+    enabled: EnabledInputModel = Field(
+        default=EnabledInputModel(), description="The supervision of the enable key."
     )
     position_slack: Annotated[float, Field(ge=0.0, le=10.0)] = Field(
         default=_INPUTS.position_slack,

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from rampe_guard.client.items import Protection
+from rampe_guard.client.machine import STATUS
 from rampe_guard.core.alarm import Level
 from rampe_guard.core.config import ActuatorConfig
 from rampe_guard.view.state import (
@@ -16,7 +18,6 @@ from rampe_guard.view.state import (
     AlertView,
     EventView,
     HealthView,
-    Protection,
     ViewState,
 )
 from rampe_guard.wire import (
@@ -29,11 +30,6 @@ from rampe_guard.wire import (
 )
 
 _KEEP_EVENTS = 50
-_PROTECTION = {
-    "ok": Protection.MONITORING,
-    "degraded": Protection.DEGRADED,
-    "not_monitoring": Protection.NOT_MONITORING,
-}
 
 
 def begin(
@@ -60,17 +56,18 @@ def begin(
             ActuatorView(a.name, a.unit, _finite(low), _finite(high), axis=a.axis, axis_sign=a.sign)
             for a, (low, high) in zip(actuators, limits, strict=True)
         ),
+        began_s=now_s,
     )
 
 
 def at(state: ViewState, now_s: float) -> ViewState:
-    """Let time pass."""
-    return replace(state, now_s=now_s)
+    """Let time pass: a guard that fell silent is told."""
+    return _tell(replace(state, now_s=now_s))
 
 
-def add_event(state: ViewState, level: Level, text: str) -> ViewState:
+def add_event(state: ViewState, level: Level, text: str, *, lost: bool = False) -> ViewState:
     """Put a line on top of the events."""
-    events = (EventView(state.now_s, level, text), *state.events)
+    events = (EventView(state.now_s, level, text, lost), *state.events)
     return replace(state, events=events[:_KEEP_EVENTS])
 
 
@@ -118,7 +115,7 @@ def on_heartbeat(state: ViewState, message: Heartbeat, now_s: float) -> ViewStat
     """Show health; a guard that restarted takes its old alerts with it."""
     before = state.health
     health = HealthView(
-        protection=_PROTECTION[message.status],
+        protection=_protection(message),
         reasons=tuple(reason.text for reason in message.reasons),
         boot_id=message.boot_id,
         received_s=now_s,
@@ -134,13 +131,7 @@ def on_heartbeat(state: ViewState, message: Heartbeat, now_s: float) -> ViewStat
     if before is not None and before.boot_id != health.boot_id:
         kept = tuple(a for a in state.alerts if a.boot_id == health.boot_id)
         state = add_event(replace(state, alerts=kept), Level.WARNING, "the guard restarted")
-    if before is None or before.protection is health.protection:
-        return state
-    if health.protection is Protection.MONITORING:
-        return add_event(state, Level.CLEAR, "monitoring again")
-    level = Level.CAUTION if health.protection is Protection.DEGRADED else Level.IMMINENT
-    text = f"{health.protection.value.upper()}: {'; '.join(health.reasons)}"
-    return add_event(state, level, text)
+    return _tell(state)
 
 
 def on_alert(state: ViewState, message: Alert, now_s: float) -> ViewState:
@@ -149,16 +140,15 @@ def on_alert(state: ViewState, message: Alert, now_s: float) -> ViewState:
     zone = message.zone or "system"
     before = next((a for a in state.alerts if a.zone == zone), None)
     others = tuple(a for a in state.alerts if a.zone != zone)
+    alert = alert_view(message, now_s, before)
     if message.state == "normal":
         state = replace(state, alerts=others)
-        return state if before is None else add_event(state, Level.CLEAR, f"{zone}: clear")
-    alert = _alert(message, zone, before, now_s)
+        if before is None or _told_by_heartbeat(before):
+            return state
+        return add_event(state, Level.CLEAR, f"{zone}: clear")
     state = replace(state, alerts=(*others, alert))
-    if alert.came_true and not (before and before.came_true):
-        return add_event(state, Level.IMMINENT, _came_true(alert, message.published_unix_s))
-    if before is None or alert.level > before.level:
-        return add_event(state, alert.level, f"{zone}: {message.text}")
-    return state
+    news = _news(alert, before, message)
+    return state if news is None else add_event(state, *news)
 
 
 def on_state(state: ViewState, message: State, now_s: float) -> ViewState:
@@ -171,7 +161,8 @@ def on_state(state: ViewState, message: State, now_s: float) -> ViewState:
     return state
 
 
-def _alert(message: Alert, zone: str, before: AlertView | None, now_s: float) -> AlertView:
+def alert_view(message: Alert, now_s: float, before: AlertView | None = None) -> AlertView:
+    """An alert as a screen shows it; ``before`` is the same alert as it was, if it was."""
     level = Level[message.level.upper()]
     came_true = message.source == "contact" or (before is not None and before.came_true)
     warned_s = before.warned_unix_s if before is not None else None
@@ -179,9 +170,10 @@ def _alert(message: Alert, zone: str, before: AlertView | None, now_s: float) ->
         warned_s = None
     elif warned_s is None and message.source != "contact":
         warned_s = message.published_unix_s
+    until_s = message.shelved_until_unix_s
     return AlertView(
         alert_id=message.alert_id,
-        zone=zone,
+        zone=message.zone or "system",
         level=level,
         boot_id=message.boot_id,
         source=message.source,
@@ -197,7 +189,66 @@ def _alert(message: Alert, zone: str, before: AlertView | None, now_s: float) ->
         expires_after_s=message.expires_after_s,
         warned_unix_s=warned_s,
         came_true=came_true,
+        inhibit=message.inhibit,
+        shelved_by=message.shelved_by,
+        shelved_for_s=None if until_s is None else until_s - message.published_unix_s,
+        acked_by=message.acked_by,
     )
+
+
+def _protection(message: Heartbeat) -> Protection:
+    status = STATUS.get(message.status)
+    if status is not None:
+        return status
+    off = [reason.code for reason in message.reasons] == ["machine_off"]
+    return Protection.MACHINE_OFF if off else Protection.NOT_MONITORING
+
+
+def _tell(state: ViewState) -> ViewState:
+    """Tell the protection if it is another than was told last."""
+    now, told = state.protection, state.told
+    waiting = state.health is None and state.began_s is not None
+    if waiting and state.now_s - (state.began_s or 0.0) <= state.expires_after_s:
+        return state
+    if now is told:
+        return state
+    state = replace(state, told=now)
+    if now is Protection.MONITORING:
+        return state if told is None else add_event(state, Level.CLEAR, "monitoring again")
+    if now is Protection.DEGRADED:
+        return add_event(state, Level.CAUTION, f"DEGRADED: {state.why}")
+    if now is Protection.MACHINE_OFF:
+        return add_event(state, Level.CLEAR, "machine switched off: not monitored")
+    head = "NOT MONITORING" if now is Protection.NOT_MONITORING else "PROTECTION UNAVAILABLE"
+    return add_event(state, Level.WARNING, f"{head}: {state.why}", lost=True)
+
+
+def _news(alert: AlertView, before: AlertView | None, message: Alert) -> tuple[Level, str] | None:
+    """Level and text of what is new in an alert; None for a repeat."""
+    zone, entered = alert.zone, alert.came_true and not (before and before.came_true)
+    news: tuple[Level, str] | None = None
+    if _told_by_heartbeat(alert):
+        pass
+    elif entered:
+        news = Level.IMMINENT, _came_true(alert, message.published_unix_s)
+    elif before is None or alert.level > before.level:
+        news = alert.level, f"{zone}: {message.text}"
+    elif alert.inhibit != before.inhibit:
+        news = Level.CLEAR, f"{zone}: {_inhibited(alert)}"
+    elif alert.acked_by and not before.acked_by:
+        news = Level.CLEAR, f"{zone}: seen by {alert.acked_by}"
+    return news
+
+
+def _told_by_heartbeat(alert: AlertView) -> bool:
+    """That nobody monitors is an alert too, but the protection has told it already."""
+    return alert.source == "system" and (alert.level >= Level.WARNING or alert.level is Level.CLEAR)
+
+
+def _inhibited(alert: AlertView) -> str:
+    if alert.inhibit == "shelved":
+        return f"shelved by {alert.shelved_by or 'someone'} for {alert.shelved_for_s or 0.0:.0f} s"
+    return "machine off" if alert.inhibit == "machine_off" else "no longer shelved"
 
 
 def _came_true(alert: AlertView, published_unix_s: float) -> str:

@@ -6,10 +6,10 @@ import math
 
 from rich.text import Text
 
+from rampe_guard.view.marks import DIM
 from rampe_guard.view.state import ActuatorView
 
 TRACK, SPAN, HERE = "─", "━", "●"
-DIM = "grey50"
 ENDS = {1: "▷", -1: "◁"}
 
 

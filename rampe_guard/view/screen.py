@@ -1,41 +1,36 @@
 """The terminal view: a pure function of `ViewState`.
 
-Manners: grey when all is normal, nothing is ever green, and no meaning hangs on colour
-alone: each level has its own shape and word. What is stale is greyed and says so; without
-a fresh heartbeat the screen says that nobody is protected, never that nothing is wrong.
+What is stale is greyed and says so; without a fresh heartbeat the screen says that nobody is
+protected, never that nothing is wrong. How levels look is in `marks`.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable
-
-from rich.cells import cell_len, set_cell_size
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from rampe_guard.client.items import Protection
 from rampe_guard.core.alarm import Level
-from rampe_guard.view.gauge import DIM, digits, gauge
-from rampe_guard.view.state import ActuatorView, AlertView, Protection, ViewState
+from rampe_guard.view.alert_row import WIDE, alert_table
+from rampe_guard.view.gauge import digits, gauge
+from rampe_guard.view.marks import (
+    ALARMING,
+    DIM,
+    GREY,
+    LOST_HZ,
+    LOST_SHAPE,
+    PROTECTION,
+    SHAPES,
+    STYLES,
+    age,
+    fit,
+    hatched,
+    lit,
+)
+from rampe_guard.view.state import ActuatorView, EventView, ViewState
 
-SHAPES = {Level.CLEAR: "·", Level.CAUTION: "◆", Level.WARNING: "▲", Level.IMMINENT: "■"}
-WORDS = {
-    Level.CLEAR: "clear",
-    Level.CAUTION: "caution",
-    Level.WARNING: "WARNING",
-    Level.IMMINENT: "IMMINENT",
-}
-STYLES = {
-    Level.CLEAR: "grey62",
-    Level.CAUTION: "yellow",
-    Level.WARNING: "bold yellow",
-    Level.IMMINENT: "bold #ffffff on #b00000",
-}
-GREY = "grey62"
-ALARM = "bold #ffffff on #b00000"
 ARROWS = {1: "→", 0: "·", -1: "←", None: "?"}
-WIDE = 110
 _FIXED_ROWS = 6
 _ALERT_ROWS = 3
 
@@ -53,63 +48,56 @@ def render(state: ViewState, width: int = 80, height: int = 24) -> RenderableTyp
     rows = len(head) + len(state.actuators) + max(1, len(state.alerts)) + spare + _FIXED_ROWS
     return Group(
         *head,
-        _title("actuators", _basis(state), width),
+        title("actuators", _basis(state), width),
         _actuators(state, width),
-        _title("alerts", "", width),
+        title("alerts", "", width),
         _alerts(state, width),
         *[Text("")] * spare,
-        _title("events", "", width),
+        title("events", "", width),
         _events(state, max(1, height - rows)),
         Text(""),
         _footer(state, width),
     )
 
 
-def level_text(level: Level) -> Text:
-    """Shape and word of a level in its colour."""
-    return Text(f" {SHAPES[level]} {WORDS[level]} ", STYLES[level])
+def event_line(event: EventView, text: str | None = None) -> Text:
+    """What happened, with shape and colour; ``text`` instead of the event's own."""
+    text = event.text if text is None else text
+    if event.lost:
+        return Text(f"{LOST_SHAPE} {text}", "bold magenta")
+    style = STYLES[event.level] if event.level is not Level.IMMINENT else "bold red"
+    return Text(f"{SHAPES[event.level]} {text}", style)
 
 
 def _header(state: ViewState, width: int) -> Text:
-    words = {
-        Protection.MONITORING: ("monitoring", GREY),
-        Protection.DEGRADED: ("▲ DEGRADED", "bold yellow"),
-        Protection.NOT_MONITORING: ("✖ NOT MONITORING", ALARM),
-        Protection.UNAVAILABLE: ("✖ PROTECTION UNAVAILABLE", ALARM),
-    }
-    word, style = words[state.protection]
+    word, style = PROTECTION[state.protection]
     name = f"{state.machine} · {state.site}"
-    line = Text(_fit(name, width - len(word) - 4), "bold")
+    line = Text(fit(name, width - len(word) - 4), "bold")
     line.append(" " * max(1, width - line.cell_len - len(word) - 2))
     return line.append(f" {word} ", style)
 
 
 def _banner(state: ViewState, width: int) -> list[Text]:
     """Three rows across the screen when nobody is protected; one when the guard is degraded."""
-    reasons = "; ".join(state.health.reasons) if state.health is not None else ""
     if state.protection is Protection.MONITORING:
         return []
     if state.protection is Protection.DEGRADED:
-        return [Text(_fit(f" ▲ degraded: {reasons}", width), "yellow")]
-    if state.protection is Protection.NOT_MONITORING:
-        lines = ["✖  NOT MONITORING  ✖", reasons or "the guard gave no reason"]
-    else:
-        silent = state.silence_s
-        lines = [
-            "✖  PROTECTION UNAVAILABLE  ✖",
-            "no message from the guard yet"
-            if silent is None
-            else f"no message from the guard for {silent:.1f} s",
-        ]
-    lines.append("Collision warnings will not come. Work as if there were none.")
-    rows = [Text(_fit(line, width), ALARM) for line in lines]
-    for row in rows:
-        row.align("center", width)
-    return rows
+        return [Text(fit(f" △ degraded: {state.why}", width), "yellow")]
+    if state.protection is Protection.MACHINE_OFF:
+        return [Text(fit(" ○ The machine says that it is switched off: not watched.", width), GREY)]
+    not_monitoring = state.protection is Protection.NOT_MONITORING
+    head = "NOT MONITORING" if not_monitoring else "PROTECTION UNAVAILABLE"
+    lines = [
+        f"{LOST_SHAPE}  {head}  {LOST_SHAPE}",
+        state.why,
+        "Collision warnings will not come. Work as if there were none.",
+    ]
+    turned = not state.seen and not lit(LOST_HZ, state.now_s)
+    return [hatched(line, width, turned=turned) for line in lines]
 
 
 def _lost(state: ViewState) -> bool:
-    return state.protection in {Protection.NOT_MONITORING, Protection.UNAVAILABLE}
+    return state.protection in ALARMING
 
 
 def _basis(state: ViewState) -> str:
@@ -152,66 +140,12 @@ def _actuators(state: ViewState, width: int) -> Table:
 
 
 def _alerts(state: ViewState, width: int) -> RenderableType:
-    if not state.alerts:
-        if _lost(state):
-            return Text(" unknown: see above", "bold yellow")
-        return Text(" none", GREY)
-    table = Table(box=None, padding=(0, 1, 0, 0), header_style=GREY, width=width, show_header=False)
-    for justify in ("left", "left", "right", "right", "left"):
-        table.add_column(justify=justify, no_wrap=True, overflow="ellipsis")
-    table.columns[1].ratio = 1
-    if width >= WIDE:
-        table.add_column(no_wrap=True)
-    for alert in sorted(state.alerts, key=_urgency):
-        table.add_row(*_alert_cells(state, alert, width))
-    return table
-
-
-def _alert_cells(state: ViewState, alert: AlertView, width: int) -> Iterable[Text]:
-    stale = state.alert_stale(alert)
-    plain = DIM if stale else ""
-    level = level_text(alert.level)
-    if stale:
-        level = Text(level.plain, DIM)
-    elif alert.level is Level.IMMINENT and alert.attention:
-        level.stylize("blink", 1, 2)  # only the shape flashes: the word stays readable
-    where = alert.zone if alert.link is None else f"{alert.link} → {alert.zone}"
-    if alert.source == "system":
-        where = alert.text or where
-    seconds = alert.time_to_collision_s
-    chance = alert.probability
-    yield level
-    yield Text(where, plain or "bold")
-    yield Text("" if seconds is None else _countdown(seconds), plain)
-    yield Text("" if chance is None else f"{chance:4.0%}", plain)
-    yield Text(_remark(state, alert, stale=stale), plain or GREY)
-    if width >= WIDE:
-        clear = alert.clearance_now_m
-        yield Text("" if clear is None else f"now {clear:+.2f} m from the margin", plain or GREY)
-
-
-def _countdown(seconds: float) -> str:
-    """Rounded down: no more time is promised than there is."""
-    tenths = max(0, math.floor(seconds * 10.0 + 1e-6))
-    return f"in {tenths / 10.0:.1f} s" if tenths else "now"
-
-
-def _remark(state: ViewState, alert: AlertView, *, stale: bool) -> str:
-    if stale:
-        return f"STALE {state.now_s - alert.received_s:.0f} s"
-    words = [alert.source]
-    if not alert.trusted:
-        words.append("DOUBTFUL")
-    if alert.gone:
-        words = ["over; please acknowledge"]
-    elif not alert.attention:
-        words.append("seen")
-    return " · ".join(words)
-
-
-def _urgency(alert: AlertView) -> tuple[int, float]:
-    seconds = alert.time_to_collision_s
-    return -alert.level, float("inf") if seconds is None else seconds
+    if state.alerts:
+        return alert_table(state.alerts, state.now_s, width)
+    if _lost(state):
+        return Text(" unknown: see above", "bold yellow")
+    off = state.protection is Protection.MACHINE_OFF
+    return Text(" none: the machine is off" if off else " none", GREY)
 
 
 def _events(state: ViewState, rows: int) -> RenderableType:
@@ -221,9 +155,7 @@ def _events(state: ViewState, rows: int) -> RenderableType:
     table.add_column(justify="right", no_wrap=True, style=GREY, min_width=8)
     table.add_column(no_wrap=True, overflow="ellipsis")
     for event in state.events[:rows]:
-        style = STYLES[event.level] if event.level is not Level.IMMINENT else "bold red"
-        text = Text(f"{SHAPES[event.level]} {event.text}", style)
-        table.add_row(f"{_age(state.now_s - event.at_s)} ago", text)
+        table.add_row(f"{age(state.now_s - event.at_s)} ago", event_line(event))
     return table
 
 
@@ -244,7 +176,8 @@ def _footer(state: ViewState, width: int) -> Text:
     return line
 
 
-def _title(name: str, remark: str, width: int) -> Text:
+def title(name: str, remark: str, width: int) -> Text:
+    """A rule with a name, and a remark at its end."""
     rule = "─" * max(0, width - len(name) - len(remark) - 5 - bool(remark))
     return Text(f"── {name} {rule}{' ' if remark else ''}{remark}", DIM)
 
@@ -270,16 +203,6 @@ def _prediction(actuator: ActuatorView, places: int, *, stale: bool) -> Text:
         return Text("—", GREY)
     spread = "" if actuator.spread is None else f" ± {actuator.spread:.{places}f}"
     return Text(f"{actuator.displacement:+.{places}f}{spread}", DIM if stale else "cyan")
-
-
-def _fit(text: str, width: int) -> str:
-    return text if cell_len(text) <= width else f"{set_cell_size(text, width - 1)}…"
-
-
-def _age(seconds: float) -> str:
-    if seconds < 60.0:  # noqa: PLR2004 - a minute
-        return f"{max(0.0, seconds):.1f} s"
-    return f"{seconds / 60.0:.0f} min"
 
 
 def _pair(p50: float | None, p99: float | None) -> str:

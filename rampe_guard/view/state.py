@@ -3,18 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
 
+from rampe_guard.client.items import Protection
 from rampe_guard.core.alarm import Level
-
-
-class Protection(Enum):
-    """What the operator can rely on."""
-
-    MONITORING = "monitoring"
-    DEGRADED = "degraded"
-    NOT_MONITORING = "not monitoring"
-    UNAVAILABLE = "unavailable"  # the guard says nothing, or nothing fresh
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +65,10 @@ class AlertView:
         expires_after_s: age at which it must not be trusted [s].
         warned_unix_s: when it first warned, on the guard's clock [s]; None below warning.
         came_true: the arm went in.
+        inhibit: why nobody is to be troubled: "none", "shelved" or "machine_off".
+        shelved_by: who shelved it.
+        shelved_for_s: for how long from ``received_s`` on [s].
+        acked_by: who acknowledged it.
     """
 
     alert_id: str
@@ -93,6 +88,25 @@ class AlertView:
     expires_after_s: float = 1.0
     warned_unix_s: float | None = None
     came_true: bool = False
+    inhibit: str = "none"
+    shelved_by: str | None = None
+    shelved_for_s: float | None = None
+    acked_by: str | None = None
+
+    @property
+    def flashes(self) -> bool:
+        """It asks for attention: nobody has seen it, its cause is there, nobody silenced it."""
+        return self.attention and not self.gone and self.inhibit == "none"
+
+    def stale(self, now_s: float) -> bool:
+        """It was not repeated in time: still shown, no longer current."""
+        return now_s - self.received_s > self.expires_after_s
+
+    def shelved_left_s(self, now_s: float) -> float | None:
+        """Until it will ask again [s]."""
+        if self.shelved_for_s is None:
+            return None
+        return max(0.0, self.received_s + self.shelved_for_s - now_s)
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,11 +142,15 @@ class HealthView:
 
 @dataclass(frozen=True, slots=True)
 class EventView:
-    """Something that happened at ``at_s`` [s], with the level that colours it."""
+    """Something that happened at ``at_s`` [s], with the level that colours it.
+
+    ``lost`` says that nobody is protected since.
+    """
 
     at_s: float
     level: Level
     text: str
+    lost: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,6 +170,8 @@ class ViewState:
         alerts: active ones, at most one per zone.
         events: newest first.
         expires_after_s: age at which heartbeat, position and command are stale [s].
+        began_s: when the watch began [s]; None = long ago.
+        told: the protection that was last told among the events.
     """
 
     machine: str
@@ -166,6 +186,8 @@ class ViewState:
     alerts: tuple[AlertView, ...] = ()
     events: tuple[EventView, ...] = ()
     expires_after_s: float = 1.0
+    began_s: float | None = None
+    told: Protection | None = None
 
     @property
     def silence_s(self) -> float | None:
@@ -180,6 +202,23 @@ class ViewState:
         return self.health.protection
 
     @property
+    def why(self) -> str:
+        """Why it is not plainly monitoring, in words."""
+        if self.protection is not Protection.UNAVAILABLE:
+            reasons = "; ".join(self.health.reasons) if self.health is not None else ""
+            return reasons or "the guard gave no reason"
+        if self.silence_s is None:
+            return "no message from the guard yet"
+        return f"no message from the guard for {self.silence_s:.1f} s"
+
+    @property
+    def seen(self) -> bool:
+        """Somebody has acknowledged that it does not monitor; for a silent guard nobody can."""
+        if self.protection is not Protection.NOT_MONITORING:
+            return False
+        return any(a.source == "system" and not a.attention for a in self.alerts)
+
+    @property
     def position_stale(self) -> bool:
         """Positions are missing or too old to be shown as present."""
         return self._too_old(self.position_received_s)
@@ -188,10 +227,6 @@ class ViewState:
     def command_stale(self) -> bool:
         """The same of lever positions."""
         return self._too_old(self.command_received_s)
-
-    def alert_stale(self, alert: AlertView) -> bool:
-        """An alert that was not repeated in time: still shown, no longer current."""
-        return self.now_s - alert.received_s > alert.expires_after_s
 
     def _too_old(self, received_s: float | None) -> bool:
         return received_s is None or self.now_s - received_s > self.expires_after_s

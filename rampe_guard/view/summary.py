@@ -10,7 +10,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from rampe_guard.view.screen import ALARM, GREY
+from rampe_guard.view.marks import ALARM, GREY
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ site's units.
 """
 
 from rampe_guard.wire.ack import Ack
-from rampe_guard.wire.alert import Alert
+from rampe_guard.wire.alert import Alert, by_urgency
 from rampe_guard.wire.codec import MAX_PAYLOAD_BYTES, decode, encode
 from rampe_guard.wire.health import (
     CanaryTrial,
@@ -19,14 +19,17 @@ from rampe_guard.wire.health import (
 )
 from rampe_guard.wire.inputs import (
     ActuatorsMessage,
+    EnabledMessage,
     JoystickMessage,
     ObjectPose,
     decode_actuators,
+    decode_enabled,
     decode_joystick,
     decode_object_pose,
 )
 from rampe_guard.wire.prediction import Endpoint, Prediction, PredictionSweep
 from rampe_guard.wire.schema import json_schemas
+from rampe_guard.wire.shelve import Shelve
 from rampe_guard.wire.state import State
 from rampe_guard.wire.sweep import SweepReply, SweepRequest, decode_sweep_request
 from rampe_guard.wire.text import MAX_TEXT, alert_text
@@ -38,6 +41,7 @@ __all__ = [
     "ActuatorsMessage",
     "Alert",
     "CanaryTrial",
+    "EnabledMessage",
     "Endpoint",
     "Heartbeat",
     "InputAges",
@@ -49,12 +53,15 @@ __all__ = [
     "PredictionSweep",
     "Quantiles",
     "Reason",
+    "Shelve",
     "State",
     "SweepReply",
     "SweepRequest",
     "alert_text",
+    "by_urgency",
     "decode",
     "decode_actuators",
+    "decode_enabled",
     "decode_joystick",
     "decode_object_pose",
     "decode_sweep_request",

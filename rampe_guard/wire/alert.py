@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Annotated, Final, Literal
 
 from msgspec import Meta
 
+from rampe_guard.core.alarm import Level, urgency
 from rampe_guard.wire import fields as f
 from rampe_guard.wire.codec import Message
 
@@ -19,7 +21,8 @@ class Alert(Message, frozen=True, kw_only=True):
         Literal["rampe.alert.v1"], Meta(description="Name and version of this contract.")
     ] = SCHEMA
     alert_id: Annotated[
-        str, Meta(description="Identifies the alert from its rise to its end; for `ack`.")
+        str,
+        Meta(description="Identifies the alert from its rise to its end; for `ack`, `shelve`."),
     ]
     boot_id: f.BootId
     seq: f.Seq
@@ -33,7 +36,11 @@ class Alert(Message, frozen=True, kw_only=True):
         Meta(description="Life cycle by ISA-18.2; rtn_unacked: cause gone, not yet seen."),
     ]
     inhibit: Annotated[
-        Literal["none", "shelved"], Meta(description="Whether it is shelved for a time.")
+        Literal["none", "shelved", "machine_off"],
+        Meta(
+            description="Why nobody is to be troubled with it. shelved: silent for a time; "
+            "machine_off: the machine is switched off, and nothing is watched."
+        ),
     ]
     quality: Annotated[
         Literal["good", "degraded", "stale"],
@@ -76,10 +83,32 @@ class Alert(Message, frozen=True, kw_only=True):
         float | None, Meta(description="Unix time of its last change of level or state [s].")
     ]
     acked_by: Annotated[str | None, Meta(description="Who acknowledged it.")]
+    shelved_by: Annotated[
+        str | None, Meta(description="Who shelved it; null unless it is shelved.")
+    ] = None
+    shelved_until_unix_s: Annotated[
+        float | None, Meta(description="Unix time at which it will ask again [s]; null as above.")
+    ] = None
     expires_after_s: Annotated[
         float, Meta(description="Age at which it must no longer be trusted [s].")
     ]
     text: Annotated[
         str,
-        Meta(description="For a cab display.", extra_json_schema={"maxLength": 60}),
+        Meta(
+            description="For a cab display: link, zone and time, on at most 60 cells.",
+            extra_json_schema={"maxLength": 60},
+        ),
     ]
+
+
+def by_urgency(alerts: Iterable[Alert]) -> tuple[Alert, ...]:
+    """The gravest first, then the soonest, then by name: the order of every list of alerts."""
+    return tuple(
+        sorted(
+            alerts,
+            key=lambda a: (
+                *urgency(Level[a.level.upper()], a.time_to_collision_s),
+                a.zone or "",
+            ),
+        )
+    )

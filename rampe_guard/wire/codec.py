@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Mapping
 from enum import Enum
 from typing import Any, TypeVar
@@ -17,6 +18,9 @@ MAX_OWN_BYTES = 16 * 1024 * 1024
 """Largest message of our own that a consumer decodes: a state holds many alerts."""
 
 T = TypeVar("T")
+
+_DECODERS: dict[Any, msgspec.json.Decoder[Any]] = {}
+_MAKING = threading.Lock()
 
 
 class Message(msgspec.Struct, frozen=True):
@@ -43,7 +47,7 @@ def decode(payload: bytes, kind: type[T], *, limit: int = MAX_OWN_BYTES) -> T:
     if len(payload) > limit:
         raise MessageError("too_large", f"{len(payload)} bytes, at most {limit} are taken")
     try:
-        return msgspec.json.decode(payload, type=kind)
+        return _decoder(kind).decode(payload)
     except msgspec.ValidationError as error:
         if "out of range" in str(error):
             raise MessageError("not_finite", f"{error}; no such quantity exists") from None
@@ -54,6 +58,15 @@ def decode(payload: bytes, kind: type[T], *, limit: int = MAX_OWN_BYTES) -> T:
         raise MessageError("bad_json", str(error)) from None
     except RecursionError:
         raise MessageError("bad_json", "nested too deeply") from None
+
+
+def _decoder(kind: type[T]) -> msgspec.json.Decoder[T]:
+    """The decoder of a type, made by one thread: msgspec crashes if two make the first at once."""
+    found = _DECODERS.get(kind)
+    if found is None:
+        with _MAKING:
+            found = _DECODERS.setdefault(kind, msgspec.json.Decoder(kind))
+    return found
 
 
 def _plain(value: Any, where: str) -> Any:

@@ -15,7 +15,7 @@ SCHEMA: Final = "rampe.heartbeat.v1"
 class Reason(Message, frozen=True, kw_only=True):
     """Why the status is not ok."""
 
-    code: Annotated[str, Meta(description="A word fit for a rule, such as joystick_stale.")]
+    code: Annotated[str, Meta(description="A word fit for a rule, such as joystick_silent.")]
     text: Annotated[str, Meta(description="The same for people.")]
     key: Annotated[
         str | None, Meta(description="The Zenoh key that is silent or wrong, if one is.")
@@ -87,7 +87,10 @@ class Heartbeat(Message, frozen=True, kw_only=True):
     machine: f.Machine
     status: Annotated[
         Literal["ok", "degraded", "not_monitoring"],
-        Meta(description="Whether the machine is guarded; not_monitoring: it is not."),
+        Meta(
+            description="Whether the machine is guarded; not_monitoring: it is not, which is no "
+            "fault if machine_off is the only reason."
+        ),
     ]
     reasons: Annotated[
         tuple[Reason, ...], Meta(description="Why not ok, the gravest first; empty when ok.")

@@ -1,4 +1,4 @@
-"""What arrives: joystick axes, actuator positions and poses of objects, checked against the site.
+"""What arrives: axes, positions, poses of objects, the enable key; checked against the site.
 
 A message is taken whole or refused whole, with one of these reasons: ``too_large``,
 ``bad_json``, ``not_finite``, ``wrong_length``, ``axis_out_of_range``, ``bad_name``,
@@ -58,6 +58,15 @@ class ActuatorsMessage(Message, frozen=True, kw_only=True):
         tuple[str, ...] | None,
         Meta(description="Actuator names, where the arrays are in another order."),
     ] = None
+    stamp: _Stamp = None
+
+
+class EnabledMessage(Message, frozen=True, kw_only=True):
+    """Whether the machine is switched on; only a fresh ``false`` switches alerts off."""
+
+    enabled: Annotated[
+        bool, Meta(description="False while the machine cannot move by the operator's levers.")
+    ]
     stamp: _Stamp = None
 
 
@@ -144,6 +153,17 @@ def decode_object_pose(payload: bytes) -> ObjectPose:
     if quaternion is not None:
         quaternion = _unit(_checked("quaternion_xyzw", quaternion, 4))
     return ObjectPose(xyz_m=xyz_m, rpy_rad=rpy, quaternion_xyzw=quaternion, stamp=message.stamp)
+
+
+def decode_enabled(payload: bytes) -> EnabledMessage:
+    """Whether the machine says that it is switched on.
+
+    Raises:
+        MessageError: with its reason, when the message cannot be trusted.
+    """
+    message = decode(payload, EnabledMessage, limit=MAX_PAYLOAD_BYTES)
+    _check_stamp(message.stamp)
+    return message
 
 
 def _unit(quaternion: tuple[float, ...]) -> tuple[float, ...]:

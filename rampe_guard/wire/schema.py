@@ -9,8 +9,9 @@ import msgspec
 from rampe_guard.wire.ack import Ack
 from rampe_guard.wire.alert import Alert
 from rampe_guard.wire.health import Heartbeat
-from rampe_guard.wire.inputs import ActuatorsMessage, JoystickMessage, ObjectPose
+from rampe_guard.wire.inputs import ActuatorsMessage, EnabledMessage, JoystickMessage, ObjectPose
 from rampe_guard.wire.prediction import Prediction
+from rampe_guard.wire.shelve import Shelve
 from rampe_guard.wire.state import State
 from rampe_guard.wire.sweep import SweepReply, SweepRequest
 
@@ -20,7 +21,9 @@ _TAKEN: dict[str, type[msgspec.Struct]] = {
     "rampe.joystick.v1": JoystickMessage,
     "rampe.actuators.v1": ActuatorsMessage,
     "rampe.object_pose.v1": ObjectPose,
+    "rampe.enabled.v1": EnabledMessage,
     "rampe.ack.v1": Ack,
+    "rampe.shelve.v1": Shelve,
     "rampe.sweep_request.v1": SweepRequest,
 }
 _SENT: dict[str, type[msgspec.Struct]] = {

@@ -1,8 +1,13 @@
-"""The line that a cab display shows for an alert: at most `MAX_TEXT` characters."""
+"""The line that a cab display shows for an alert: at most `MAX_TEXT` characters and cells.
+
+It names the link, the zone and the time; where there is none, a word stands in for it. Names
+that are too long are shortened, the sentence never.
+"""
 
 from __future__ import annotations
 
 import math
+import unicodedata
 
 MAX_TEXT = 60
 _ARROW = " → "
@@ -15,8 +20,10 @@ def alert_text(
     time_to_collision_s: float | None,
     level: str = "warning",
     source: str = "intent",
+    *,
+    machine_off: bool = False,
 ) -> str:
-    """Text such as ``bucket → cab-wall in 1.4 s``; long names are cut, the time never.
+    """Text such as ``bucket → cab-wall in 1.4 s``.
 
     Args:
         link: the link that touches; None reads "arm".
@@ -24,21 +31,27 @@ def alert_text(
         time_to_collision_s: [s], rounded down: no more time is promised than there is.
         level: "clear", "caution", "warning" or "imminent".
         source: of the alert.
+        machine_off: it is suppressed, since the machine is switched off.
     """
     link, zone = _line(link or "arm"), _line(zone or "obstacle")
     if source == "system":
-        if level == "clear":
-            return "monitoring again"
-        if level == "caution":  # it monitors, but something was amiss
-            return _cut(zone, MAX_TEXT)
-        head = "NOT MONITORING: "
-        return head + _cut(zone, MAX_TEXT - len(head))
+        return _system(zone, level, machine_off=machine_off)
+    if machine_off:
+        return _pair(link, _ARROW, zone, ": machine off")
     if level == "clear":
-        tail = " clear"
-        return _cut(zone, MAX_TEXT - len(tail)) + tail
+        return _pair(link, " clear of ", zone, " now")
     if source == "contact":
-        return _pair(link, " at ", zone, "")
+        return _pair(link, " at ", zone, " now")
     return _pair(link, _ARROW, zone, _when(time_to_collision_s))
+
+
+def _system(reason: str, level: str, *, machine_off: bool) -> str:
+    if level == "clear":
+        return "machine off: not monitoring" if machine_off else "monitoring again"
+    if level == "caution":  # it monitors, but something was amiss
+        return _cut(reason, MAX_TEXT)
+    head = "NOT MONITORING: "
+    return head + _cut(reason, MAX_TEXT - len(head))
 
 
 def _when(time_s: float | None) -> str:
@@ -54,13 +67,27 @@ def _pair(first: str, between: str, second: str, tail: str) -> str:
     """Both names in the room left, each with at least half of it where it needs so much."""
     room = MAX_TEXT - len(between) - len(tail)
     half = room // 2
-    for_first = max(half, room - len(second))
+    for_first = max(half, room - _cells(second))
     first = _cut(first, for_first)
-    return first + between + _cut(second, room - len(first)) + tail
+    return first + between + _cut(second, room - _cells(first)) + tail
 
 
 def _cut(name: str, room: int) -> str:
-    return name if len(name) <= room else name[: room - 1] + "…"
+    """As much of ``name`` as ``room`` cells hold, with "…" where something is missing."""
+    if _cells(name) <= room:
+        return name
+    kept, left = [], room - 1
+    for letter in name:
+        left -= _cells(letter)
+        if left < 0:
+            break
+        kept.append(letter)
+    return "".join(kept) + "…"
+
+
+def _cells(name: str) -> int:
+    """Width on a display in cells, none below one for each character: both are limited."""
+    return sum(2 if unicodedata.east_asian_width(letter) in "WF" else 1 for letter in name)
 
 
 def _line(name: str) -> str:

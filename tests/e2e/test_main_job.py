@@ -106,6 +106,12 @@ def test_an_active_alert_repeats_at_5_hz_and_can_be_acknowledged(live: Station) 
     assert 4 <= len(repeats) <= 9
     alert_id = repeats[-1]["alert_id"]
 
+    refused = command(
+        *("shelve", live.site_path, alert_id, "--who", "tester", "--for", "5"),
+        *("--connect", live.endpoint),
+    )
+    assert refused.returncode == 2
+    assert "imminent is never shelved" in refused.stderr
     acked_s = time.monotonic()
     args = ("ack", live.site_path, alert_id, "--who", "tester", "--connect", live.endpoint)
     done = command(*args)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 
 from rampe_guard.settings import load_site
 from tests.support import processes
+from tests.support.contract import Contract
 from tests.support.ears import Ears
 from tests.support.processes import BENCH, ROOT, Process
 from tests.support.rig import Rig
@@ -21,7 +23,9 @@ NOTICE_S = 1.0
 
 
 @pytest.mark.parametrize("silent", ["joystick", "actuators"])
-def test_silence_freezes_the_alerts_and_says_not_monitoring(live: Station, silent: str) -> None:
+def test_silence_freezes_the_alerts_and_says_not_monitoring(
+    live: Station, silent: str, contract: Contract
+) -> None:
     live.calm()
     live.press_on_crate()
     rig, ears = live.rig, live.ears
@@ -39,6 +43,8 @@ def test_silence_freezes_the_alerts_and_says_not_monitoring(live: Station, silen
     assert system.body["state"] == "unacked"
     assert system.body["text"].startswith("NOT MONITORING: ")
     assert silent in system.body["text"]
+
+    shelve_for_a_while(live, system.body["alert_id"], contract)
 
     time.sleep(1.0)
     frozen = [h.body for h in ears.since(beat.at_s + 0.1, "alert") if h.body["source"] != "system"]
@@ -68,6 +74,38 @@ def test_silence_freezes_the_alerts_and_says_not_monitoring(live: Station, silen
     live.calm()
 
 
+def shelve_for_a_while(live: Station, alert_id: str, contract: Contract) -> None:
+    """Silence an alert and end its silence: told to all, and to who comes late."""
+    ears, base = live.ears, live.site.keys.base
+
+    def wish(duration_s: float, alert: str = alert_id) -> bytes:
+        return json.dumps({"alert_id": alert, "who": "tester", "duration_s": duration_s}).encode()
+
+    start_s = time.monotonic()
+    assert "at most 30 s" in ears.refusal(f"{base}/shelve", wish(31.0))
+    assert "'nobody' is shown" in ears.refusal(f"{base}/shelve", wish(5.0, "nobody"))
+    assert "duration_s" in ears.refusal(f"{base}/shelve", wish(-1.0))
+    (shelved,) = ears.ask(f"{base}/shelve", wish(20.0))
+    contract.check(shelved)
+    assert (shelved["inhibit"], shelved["shelved_by"]) == ("shelved", "tester")
+    assert shelved["shelved_until_unix_s"] == pytest.approx(time.time() + 20.0, abs=2.0)
+    assert (shelved["level"], shelved["state"]) == ("warning", "unacked")
+    heard = ears.wait("alert", lambda b: b["inhibit"] == "shelved", 2.0, start_s)
+    assert heard.body == shelved
+    (state,) = ears.ask(f"{base}/state")
+    contract.check(state)
+    assert [a["shelved_by"] for a in state["alerts"] if a["alert_id"] == alert_id] == ["tester"]
+    levels = [a["level"] for a in state["alerts"]]
+    assert levels[:2] == ["imminent", "warning"]  # the gravest first
+    done = processes.command(
+        *("shelve", live.site_path, alert_id, "--who", "tester", "--for", "0"),
+        *("--connect", live.endpoint),
+    )
+    assert done.returncode == 0, done.stderr
+    ended = ears.wait("alert", lambda b: b["inhibit"] == "none", 2.0, heard.at_s)
+    assert (ended.body["shelved_by"], ended.body["shelved_until_unix_s"]) == (None, None)
+
+
 def on_change_site(folder: Path) -> Path:
     """The bench site on keys of its own, with a joystick that speaks only when it moves."""
     text = BENCH.read_text("utf-8")
@@ -79,6 +117,14 @@ def on_change_site(folder: Path) -> Path:
             "joystick: {timeout_s: 1.0}",
             "joystick: {timeout_s: 1.0, on_change: true, alive_key: rampe/bench/on-change/lever}",
         ),
+        (
+            "  actuators: {timeout_s: 1.0}",
+            "  actuators: {timeout_s: 1.0}\n  enabled: {timeout_s: 60.0}",
+        ),
+        (
+            "  base: rampe/bench/on-change/guard",
+            "  base: rampe/bench/on-change/guard\n  enabled: rampe/bench/on-change/enabled",
+        ),
     ):
         assert old in text
         text = text.replace(old, new)
@@ -88,7 +134,7 @@ def on_change_site(folder: Path) -> Path:
 
 
 def test_an_on_change_joystick_may_be_silent_while_its_token_lives(
-    live: Station, tmp_path: Path
+    live: Station, tmp_path: Path, contract: Contract
 ) -> None:
     site_path = on_change_site(tmp_path)
     site = load_site(site_path)
@@ -117,3 +163,21 @@ def test_an_on_change_joystick_may_be_silent_while_its_token_lives(
             beat = ears.wait("heartbeat", lambda b: b["status"] == "not_monitoring", 5.0, killed_s)
             assert beat.at_s - killed_s <= NOTICE_S
             assert site.keys.joystick in {r["key"] for r in beat.body["reasons"]}
+
+        # the machine says that it is switched off: no fault any more
+        assert site.keys.enabled is not None
+        off_s = time.monotonic()
+        rig.lever({"enabled": False, "stamp": time.time()}, site.keys.enabled)
+        beat = ears.wait(
+            "heartbeat", lambda b: [r["code"] for r in b["reasons"]] == ["machine_off"], 2.0, off_s
+        )
+        assert beat.body["status"] == "not_monitoring"
+        assert beat.body["reasons"][0]["key"] == site.keys.enabled
+        over = ears.wait("alert", lambda b: b["inhibit"] == "machine_off", 4.0, off_s)
+        contract.check(over.body)
+        assert (over.body["level"], over.body["state"]) == ("clear", "rtn_unacked")
+        assert over.body["text"] == "machine off: not monitoring"
+        on_s = time.monotonic()
+        rig.lever({"enabled": True}, site.keys.enabled)
+        beat = ears.wait("heartbeat", lambda b: "gone" in b["reasons"][0]["code"], 2.0, on_s)
+        assert beat.body["status"] == "not_monitoring"

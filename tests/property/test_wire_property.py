@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import re
+import unicodedata
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -146,6 +148,36 @@ def test_text_fits_one_line_of_the_display(
     text = alert_text(link, zone, time_s, level, source)
     assert 0 < len(text) <= MAX_TEXT
     assert text.isprintable()
+
+
+names = st.text("abcxyz-_09éß…→挖斗壁\U0001f6a7", min_size=1, max_size=90)
+
+
+@given(
+    link=names,
+    zone=names,
+    time_s=st.none() | st.floats(0.0, 1e3),
+    level=st.sampled_from(["clear", "caution", "warning", "imminent"]),
+    source=st.sampled_from(["stopping", "intent", "next", "contact"]),
+    off=st.booleans(),
+)
+def test_text_always_names_link_zone_and_time(
+    link: str, zone: str, time_s: float | None, level: str, source: str, *, off: bool
+) -> None:
+    text = alert_text(link, zone, time_s, level, source, machine_off=off)
+    width = sum(2 if unicodedata.east_asian_width(letter) in "WF" else 1 for letter in text)
+    assert max(len(text), width) <= MAX_TEXT
+    rest = _without(text, link)
+    between = next(word for word in (" → ", " at ", " clear of ") if rest.startswith(word))
+    when = _without(rest.removeprefix(between), zone)
+    assert re.fullmatch(r" now| in [0-9]+\.[0-9] s| in >99 s|, time unknown|: machine off", when)
+
+
+def _without(text: str, name: str) -> str:
+    """``text`` after ``name``, of which ten letters at least are left if it is cut."""
+    cuts = (name[:size] + "…" for size in range(len(name) - 1, 9, -1))
+    shown = next(cut for cut in (name, *cuts) if text.startswith(cut))
+    return text.removeprefix(shown)
 
 
 @given(time_s=st.floats(0.1, 99.0))

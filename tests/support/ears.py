@@ -81,6 +81,13 @@ class Ears:
         replies = self.session.get(key, payload=payload, timeout=5.0)
         return [json.loads(r.ok.payload.to_bytes()) for r in replies if r.ok is not None]
 
+    def refusal(self, key: str, payload: bytes) -> str:
+        """Query a key that must refuse; its words."""
+        replies = list(self.session.get(key, payload=payload, timeout=5.0))
+        assert len(replies) == 1
+        assert replies[0].err is not None, replies[0].ok
+        return str(replies[0].err.payload.to_string())
+
     def tokens(self, key: str) -> list[str]:
         """Liveliness tokens that exist on a key expression."""
         replies = self.session.liveliness().get(key, timeout=5.0)

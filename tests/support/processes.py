@@ -57,16 +57,21 @@ def environment(state: Path) -> dict[str, str]:
 
 
 class Process:
-    """``python ARGS`` with stdout, stderr and kept models in files below ``folder``."""
+    """``python ARGS`` with stdout, stderr and kept models in files below ``folder``.
 
-    def __init__(self, folder: Path, name: str, args: Sequence[str | Path]) -> None:
+    ``talk`` lets `tell` write lines to its stdin.
+    """
+
+    def __init__(
+        self, folder: Path, name: str, args: Sequence[str | Path], *, talk: bool = False
+    ) -> None:
         self._out_path = folder / f"{name}-{time.monotonic_ns()}.out"
         self._err_path = self._out_path.with_suffix(".err")
         with self._out_path.open("wb") as out, self._err_path.open("wb") as err:
             self.popen = subprocess.Popen(
                 [sys.executable, *map(str, args)],
                 cwd=ROOT,
-                stdin=subprocess.DEVNULL,
+                stdin=subprocess.PIPE if talk else subprocess.DEVNULL,
                 stdout=out,
                 stderr=err,
                 env=environment(folder / "state"),
@@ -89,6 +94,12 @@ class Process:
     @property
     def alive(self) -> bool:
         return self.popen.poll() is None
+
+    def tell(self, line: str) -> None:
+        """Write a line to its stdin."""
+        assert self.popen.stdin is not None
+        self.popen.stdin.write(f"{line}\n".encode())
+        self.popen.stdin.flush()
 
     def wait_for(self, text: str, within_s: float = START_S) -> None:
         """Wait until ``text`` is in its output or log; fails at once if it ends before."""
@@ -117,6 +128,8 @@ class Process:
             except subprocess.TimeoutExpired:
                 self.popen.kill()
         self.popen.wait()
+        if self.popen.stdin is not None:
+            self.popen.stdin.close()
 
     def __enter__(self) -> Self:
         return self

@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rampe_guard.core.types import Inputs
+from rampe_guard.core.types import EnabledSample, Inputs
 from rampe_guard.runtime.intake import Intake
 from rampe_guard.runtime.say import Sayer
 from rampe_guard.runtime.worker import arrived
@@ -20,7 +20,7 @@ from rampe_guard.settings import load_site
 SITE = """\
 site: quarry
 machine: e7
-keys: {joystick: r/joystick, actuators: r/actuators, base: r/guard}
+keys: {joystick: r/joystick, actuators: r/actuators, base: r/guard, enabled: r/enabled}
 arm:
   urdf: arm.urdf
   actuators:
@@ -75,7 +75,7 @@ def intake(post: Post, tmp_path: Path) -> Intake:
 
 
 def test_only_objects_with_a_key_are_subscribed_to(post: Post, intake: Intake) -> None:
-    assert set(post.rings) == {"r/joystick", "r/actuators", "r/truck", "r/van"}
+    assert set(post.rings) == {"r/joystick", "r/actuators", "r/enabled", "r/truck", "r/van"}
     assert not arrived(intake.collect(1.0))
 
 
@@ -124,6 +124,35 @@ def test_what_is_no_pose_is_refused_by_name(post: Post, intake: Intake) -> None:
 def test_refusals_alone_wake_the_guard() -> None:
     assert arrived(Inputs(objects_rejected=(("truck", "bad_json"),)))
     assert not arrived(Inputs())
+
+
+def test_the_enable_key_speaks_in_plain_booleans(post: Post, intake: Intake) -> None:
+    post.put("r/enabled", {"enabled": False, "stamp": 7.0})
+    post.put("r/enabled", {"enabled": True})
+    inputs = intake.collect(12.0)
+    assert arrived(inputs)
+    assert inputs.enabled == (
+        EnabledSample(enabled=False, stamp_s=7.0, arrival_s=12.0),
+        EnabledSample(enabled=True, stamp_s=12.0, arrival_s=12.0, stamped=False),
+    )
+
+
+@pytest.mark.parametrize(
+    ("body", "reason"),
+    [
+        ({"enabled": 0}, "bad_json"),
+        ({"enabled": None}, "bad_json"),
+        ({"stamp": 1.0}, "bad_json"),
+        (b"false", "bad_json"),
+        ({"enabled": False, "stamp": 1e15}, "not_finite"),
+    ],
+)
+def test_what_is_no_plain_word_is_refused_and_never_off(
+    post: Post, intake: Intake, body: Any, reason: str
+) -> None:
+    post.put("r/enabled", body)
+    inputs = intake.collect(1.0)
+    assert (inputs.enabled, inputs.rejected) == ((), (("enabled", reason),))
 
 
 def test_lost_poses_are_counted(post: Post, intake: Intake) -> None:

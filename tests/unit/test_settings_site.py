@@ -74,7 +74,7 @@ def test_only_five_keys_are_required_and_the_rest_defaults(load: Load, tmp_path:
     assert site.zenoh.connect == ("tcp/127.0.0.1:7447",)
     assert (site.zenoh.mode, site.zenoh.config, site.log) == ("client", None, None)
     assert site.keys.base == "rampe/q/e/guard"
-    assert site.keys.joystick_alive is None
+    assert (site.keys.joystick_alive, site.keys.enabled) == (None, None)
     swing, boom = site.guard.actuators
     assert (swing.axis, swing.sign, swing.unit, swing.max_deceleration) == (0, 1, "rad", 1.2)
     assert (swing.lag_s, swing.deadband) == (0.15, 0.05)
@@ -225,6 +225,8 @@ def test_every_field_of_the_core_can_be_set(model: type, config: type) -> None:
         ("q/e/joystick", "q/e/joystick/", "starts or ends with a slash"),
         ("q/e/joystick", "q//joystick", "has an empty part (//)"),
         ("q/e/joystick", "q/e/actuators", "is also keys.joystick; give every key its own name"),
+        ("q/e/guard", "q/e/guard\n  enabled: rampe/q/e/guard/shelve", "that the guard itself"),
+        ("q/e/guard", "q/e/guard\n  enabled: rampe/*/e/on", "keys.enabled: 'rampe/*/e/on' has '*'"),
         ("q/e/joystick", "q/e/guard/alert", "is a key that the guard itself publishes"),
         ("arm.urdf", "leg.urdf", "site.yaml:8: arm.urdf: 'leg.urdf' does not exist"),
         ("arm.urdf", ".", "arm.urdf: '.' is a directory; give the path of a URDF file"),
@@ -261,6 +263,8 @@ def test_mistake_is_named_with_line_key_value_and_remedy(
         ("memory: {directory: ~nobody-here/a}", "begins with a home that does not exist"),
         ("stopping:", "stopping: nothing is not a mapping"),
         ("alerts: {caution_probability: 0.9}", "0.9 is greater than warning_probability"),
+        ("alerts: {republish_s: 0.6}", "expires_after_s: 1 s is less than two periods of republ"),
+        ("alerts: {shelve_max_s: 31}", "alerts.shelve_max_s: 31 is greater than 30"),
         ("log: {time: t, joystick: {}, actuators: {}}", "has no column for swing, boom"),
         (
             "log: {time: t, joystick: {swing: a, bom: b}, actuators: {swing: a, boom: b}}",
@@ -365,6 +369,15 @@ def test_the_folder_of_models_may_be_absolute_or_in_a_home(
     monkeypatch.setenv("HOME", "/home/anna")
     for given, expected in (("/var/models", "/var/models"), ("~/models", "/home/anna/models")):
         assert load(SITE + f"memory: {{directory: {given}}}\n").memory.directory == expected
+
+
+def test_only_a_machine_with_a_key_for_it_can_be_off(load: Load) -> None:
+    assert load(SITE).guard.inputs.enabled_timeout_s is None
+    keyed = SITE.replace("/guard\n", "/guard\n  enabled: rampe/q/e/on\n")
+    assert load(keyed).keys.enabled == "rampe/q/e/on"
+    assert load(keyed).guard.inputs.enabled_timeout_s == 2.0
+    slow = load(keyed + "inputs: {enabled: {timeout_s: 5}}\n")
+    assert slow.guard.inputs.enabled_timeout_s == 5.0
 
 
 def test_another_operator_for_one_run(load: Load) -> None:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 from msgspec import structs
 
+from rampe_guard.client.items import Protection
 from rampe_guard.core.alarm import Level
 from rampe_guard.core.config import ActuatorConfig
 from rampe_guard.view import follow
-from rampe_guard.view.state import Protection, ViewState
+from rampe_guard.view.state import ViewState
 from rampe_guard.wire import (
     ActuatorsMessage,
     Alert,
@@ -186,6 +189,80 @@ def test_health_comes_from_the_heartbeat_and_its_changes_are_told() -> None:
     assert state.protection is Protection.NOT_MONITORING
     state = follow.on_heartbeat(state, HEARTBEAT, 10.4)
     assert texts(state) == ["monitoring again", "NOT MONITORING: no joystick for 0.7 s"]
+
+
+def test_a_guard_that_falls_silent_is_told_once_and_so_is_its_return() -> None:
+    state = follow.on_heartbeat(fresh(), HEARTBEAT, 10.0)
+    for tenths in range(1, 30):
+        state = follow.at(state, 10.0 + tenths / 10)
+    assert texts(state) == ["PROTECTION UNAVAILABLE: no message from the guard for 1.1 s"]
+    assert state.events[0].lost
+    state = follow.on_heartbeat(state, HEARTBEAT, 13.0)
+    assert texts(state)[0] == "monitoring again"
+
+
+def test_a_guard_that_is_never_heard_is_told_after_a_second() -> None:
+    assert texts(follow.at(fresh(), 10.9)) == []
+    state = follow.at(follow.at(fresh(), 11.1), 12.0)
+    assert texts(state) == ["PROTECTION UNAVAILABLE: no message from the guard yet"]
+
+
+def test_not_monitoring_is_told_once_though_alert_and_heartbeat_say_it() -> None:
+    said: dict[str, Any] = {
+        "source": "system",
+        "zone": None,
+        "link": None,
+        "text": "NOT MONITORING: joystick",
+    }
+    state = alerts(said)
+    assert texts(state) == []
+    assert [a.text for a in state.alerts] == ["NOT MONITORING: joystick"]
+    lost = Reason(code="joystick_silent", text="joystick silent")
+    beat = structs.replace(HEARTBEAT, status="not_monitoring", reasons=(lost,))
+    state = follow.on_heartbeat(state, beat, 10.2)
+    state = follow.on_alert(state, sent(structs.replace(ALERT, **said)), 10.3)
+    state = follow.on_heartbeat(state, HEARTBEAT, 10.4)
+    over = structs.replace(ALERT, **said, level="clear", state="normal")
+    state = follow.on_alert(state, sent(over), 10.4)
+    assert texts(state) == ["monitoring again", "NOT MONITORING: joystick silent"]
+
+
+def test_a_crash_is_told_though_the_guard_monitors_again() -> None:
+    crash: dict[str, object] = {
+        "source": "system",
+        "zone": None,
+        "level": "caution",
+        "text": "guard restarted",
+    }
+    assert texts(alerts(crash)) == ["system: guard restarted"]
+
+
+def test_a_machine_that_is_off_is_no_loss() -> None:
+    off = Reason(code="machine_off", text="the machine is switched off")
+    beat = structs.replace(HEARTBEAT, status="not_monitoring", reasons=(off,))
+    state = follow.on_heartbeat(follow.on_heartbeat(fresh(), HEARTBEAT, 10.0), beat, 10.2)
+    assert state.protection is Protection.MACHINE_OFF
+    assert texts(state) == ["machine switched off: not monitored"]
+    assert not state.events[0].lost
+    both = structs.replace(beat, reasons=(off, Reason(code="canary_failed", text="wrong")))
+    assert follow.on_heartbeat(state, both, 10.4).protection is Protection.NOT_MONITORING
+
+
+def test_shelving_and_acknowledging_are_told() -> None:
+    until: dict[str, object] = {
+        "inhibit": "shelved",
+        "shelved_by": "ann",
+        "shelved_until_unix_s": 1e9 + 20.0,
+    }
+    state = alerts({}, until, until, {}, {"state": "acked", "acked_by": "bob"})
+    assert texts(state)[:3] == [
+        "wall: seen by bob",
+        "wall: no longer shelved",
+        "wall: shelved by ann for 20 s",
+    ]
+    (alert,) = alerts(until).alerts
+    assert alert.shelved_left_s(15.0) == pytest.approx(15.0)
+    assert not alert.flashes
 
 
 def test_an_alert_rises_and_clears() -> None:

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-import io
 import re
 from dataclasses import replace
 
 import pytest
 from rich.cells import cell_len
-from rich.console import Console, RenderableType
 
+from rampe_guard.client.items import Protection
 from rampe_guard.core.alarm import Level
+from rampe_guard.view.marks import HATCH
 from rampe_guard.view.screen import render
 from rampe_guard.view.state import (
     ActuatorView,
     AlertView,
     EventView,
     HealthView,
-    Protection,
     ViewState,
 )
+from tests.support.rendered import line_of, shown
 
 NOW = 100.0
 ACTUATORS = (
@@ -58,23 +58,6 @@ STATE = ViewState(
 CALM = replace(STATE, alerts=())
 
 
-def shown(renderable: RenderableType, width: int = 80, *, styles: bool = False) -> str:
-    console = Console(
-        record=True,
-        width=width,
-        file=io.StringIO(),
-        force_terminal=True,
-        color_system="truecolor",
-        legacy_windows=False,
-    )
-    console.print(renderable)
-    return console.export_text(styles=styles)
-
-
-def line_of(text: str, word: str) -> str:
-    return next(line for line in text.splitlines() if word in line)
-
-
 @pytest.mark.parametrize("width", [80, 120])
 @pytest.mark.parametrize(
     "state",
@@ -109,8 +92,8 @@ def test_alerts_are_sorted_by_urgency_with_shape_and_word() -> None:
     rows = [i for i, line in enumerate(lines) if " → " in line and "in " in line]
     assert [lines[i].split()[:2] for i in rows] == [
         ["■", "IMMINENT"],
-        ["▲", "WARNING"],
-        ["◆", "caution"],
+        ["△", "WARNING"],
+        ["◇", "caution"],
     ]
     assert "bucket → wall" in lines[rows[1]]
     assert "83%" in lines[rows[1]]
@@ -163,8 +146,9 @@ def test_no_protection_is_unmissable_and_never_reads_as_no_alert(
     assert reason in text
     assert "unknown" in text
     assert not re.search(r"^ none\s*$", text, re.MULTILINE)
-    styled = line_of(shown(render(state), styles=True), f"✖  {headline}")
-    assert "48;2;176;0;0" in styled
+    styled = line_of(shown(render(state), styles=True), f"✕  {headline}")
+    assert "48;2;139;0;139" in styled  # in the bright half of its pulse
+    assert HATCH * 3 in styled
 
 
 def test_a_heartbeat_just_within_its_time_still_counts() -> None:
@@ -195,7 +179,7 @@ def test_no_forecast_is_drawn_while_nobody_monitors() -> None:
 def test_degraded_shows_its_reason_and_keeps_monitoring() -> None:
     health = replace(HEALTH, protection=Protection.DEGRADED, reasons=("2 messages refused",))
     text = shown(render(replace(CALM, health=health)))
-    assert "▲ DEGRADED" in text
+    assert "△ DEGRADED" in text
     assert "2 messages refused" in text
     assert re.search(r"^ none\s*$", text, re.MULTILINE)
 
@@ -209,14 +193,42 @@ def test_doubtful_seen_and_finished_alerts_are_marked() -> None:
     assert "acknowledge" in remark(replace(ALERTS[1], gone=True))
 
 
-def test_only_an_unseen_imminent_alert_flashes() -> None:
-    def flashes(alert: AlertView) -> bool:
-        row = line_of(shown(render(replace(STATE, alerts=(alert,))), styles=True), alert.zone)
-        return bool(re.search(r"\x1b\[(?:\d;)*5[;m]", row))
+def flashes(alert: AlertView, after_s: float) -> bool:
+    """Its shape is there now, and is not ``after_s`` later."""
 
-    assert flashes(ALERTS[1])
-    assert not flashes(replace(ALERTS[1], attention=False))
-    assert not flashes(ALERTS[2])
+    def row(now_s: float) -> str:
+        state = replace(STATE, alerts=(replace(alert, received_s=now_s),), now_s=now_s)
+        return line_of(shown(render(state)), alert.zone)
+
+    return row(NOW).split()[0] != row(NOW + after_s).split()[0]
+
+
+def test_only_what_nobody_has_seen_flashes_and_each_level_at_its_own_rate() -> None:
+    imminent, warning, caution = ALERTS[1], ALERTS[2], ALERTS[0]
+    assert flashes(imminent, 0.13)
+    assert not flashes(warning, 0.13)
+    assert flashes(warning, 0.51)
+    assert not any(flashes(caution, after / 10) for after in range(20))
+    for quiet in ({"attention": False}, {"gone": True}, {"inhibit": "shelved"}):
+        assert not flashes(replace(imminent, **quiet), 0.13)
+
+
+def test_a_shelved_alert_says_by_whom_and_for_how_long_and_has_no_colour() -> None:
+    shelved = replace(ALERTS[2], inhibit="shelved", shelved_by="ann", shelved_for_s=20.0)
+    state = replace(STATE, alerts=(shelved,), now_s=NOW + 0.5)
+    row = line_of(shown(render(state), styles=True), "wall")
+    assert "shelved by ann, 20 s left" in row
+    assert "\x1b[1;33m" not in row
+
+
+def test_a_machine_that_is_off_is_grey_and_never_reads_as_monitoring() -> None:
+    state = replace(CALM, health=replace(HEALTH, protection=Protection.MACHINE_OFF))
+    text = shown(render(state), styles=True)
+    assert "○ machine off" in text
+    assert "switched off: not watched" in text
+    assert "none: the machine is off" in text
+    assert "monitoring" not in text
+    assert "48;2" not in text
 
 
 def test_an_alert_does_not_move_the_events() -> None:

@@ -18,8 +18,8 @@ from rampe_guard.wire import MAX_TEXT, alert_text
         (("bucket", "cab-wall", None), "bucket → cab-wall, time unknown"),
         (("bucket", "cab-wall", float("inf")), "bucket → cab-wall, time unknown"),
         ((None, "road-side", 1.0), "arm → road-side in 1.0 s"),
-        (("bucket", "cab-wall", 0.0, "imminent", "contact"), "bucket at cab-wall"),
-        (("bucket", "cab-wall", None, "clear"), "cab-wall clear"),
+        (("bucket", "cab-wall", 0.0, "imminent", "contact"), "bucket at cab-wall now"),
+        (("bucket", "cab-wall", None, "clear"), "bucket clear of cab-wall now"),
         ((None, "joystick silent", None, "warning", "system"), "NOT MONITORING: joystick silent"),
         ((None, "joystick silent", None, "clear", "system"), "monitoring again"),
         ((None, "guard restarted", None, "caution", "system"), "guard restarted"),
@@ -28,6 +28,18 @@ from rampe_guard.wire import MAX_TEXT, alert_text
 )
 def test_text(arguments: tuple[str | None, str | None, float | None], text: str) -> None:
     assert alert_text(*arguments) == text
+
+
+def test_a_suppressed_alert_never_reads_as_clear() -> None:
+    text = alert_text("bucket", "cab-wall", None, "clear", "intent", machine_off=True)
+    assert text == "bucket → cab-wall: machine off"
+    text = alert_text(None, "no joystick", None, "clear", "system", machine_off=True)
+    assert text == "machine off: not monitoring"
+
+
+def test_wide_letters_take_two_cells_of_the_display() -> None:
+    text = alert_text("挖斗" * 20, "壁" * 40, 1.4)
+    assert text == "挖斗" * 5 + "挖… → " + "壁" * 12 + "… in 1.4 s"
 
 
 def test_long_names_are_cut_and_the_time_stays() -> None:

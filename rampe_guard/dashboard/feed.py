@@ -1,0 +1,251 @@
+"""One machine over Zenoh: what was heard becomes a `Sight`.
+
+A thread of its own opens the session (for as long as it takes) and asks the guard for its
+`state` when something may have been missed. Everything else happens in `poll`: nothing is
+computed in a Zenoh callback, and what nobody polls is dropped by the rings of the inboxes,
+so a dashboard that stands still harms nobody.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from rampe_guard import wire
+from rampe_guard.client import fleet as fleets
+from rampe_guard.client.fleet import Fleet, Told
+from rampe_guard.client.items import Item
+from rampe_guard.core.types import ActuatorSample, FloatArray
+from rampe_guard.core.velocity import VelocityEstimator
+from rampe_guard.dashboard.happenings import Leads, with_items
+from rampe_guard.dashboard.sight import Sight
+from rampe_guard.errors import ConnectionFailedError, MessageError
+from rampe_guard.runtime.stopping import StopFlag
+from rampe_guard.runtime.zenoh_io import Bus, Inbox, Liveness
+from rampe_guard.settings import Site
+
+T = TypeVar("T")
+
+_CAPACITY = 1024
+"""Of an inbox: several seconds of a fast machine."""
+_ASK_S = 0.25
+"""Period at which the guard is asked for its state while something may be missing [s]."""
+_ANSWER_S = 1.0
+_KEPT_ANSWERS = 8
+
+
+@dataclass(frozen=True, slots=True)
+class _Line:
+    """An open session with its inboxes."""
+
+    bus: Bus
+    joystick: Inbox
+    actuators: Inbox
+    alerts: Inbox
+    predictions: Inbox
+    beats: Inbox
+    token: Liveness
+    objects: tuple[tuple[str, Inbox], ...]
+
+
+class Feed:
+    """Follows one machine.
+
+    Args:
+        site: whose machine; its Zenoh settings say where.
+        stop: ends the thread.
+
+    Attributes:
+        sight: what is known, as of the last `poll`.
+    """
+
+    def __init__(self, site: Site, stop: StopFlag) -> None:
+        self._site = site
+        self._base = site.keys.base
+        self._stop = stop
+        now_s = time.monotonic()
+        self._fleet, _ = fleets.expect(Fleet(), self._base, now_s)
+        self.sight = Sight(
+            self._fleet.machines[self._base], now_s, trouble="connecting to the Zenoh router"
+        )
+        self._speed = VelocityEstimator(np.array([a.max_velocity for a in site.guard.actuators]))
+        self._leads = Leads()
+        self._token: bool | None = None
+        self._line: _Line | None = None
+        self._trouble = self.sight.trouble
+        self._answers: deque[tuple[float, wire.State]] = deque(maxlen=_KEPT_ANSWERS)
+        self._thread = threading.Thread(target=self._work, name=f"feed {self._base}", daemon=True)
+
+    def start(self) -> None:
+        """Begin to connect."""
+        self._thread.start()
+
+    def poll(self, now_s: float) -> Sight:
+        """Take all that arrived; returns the new `sight`."""
+        items: list[Item] = []
+        sight = replace(self.sight, now_s=now_s, trouble=self._trouble)
+        line = self._line
+        if line is not None:
+            sight = self._take_inputs(line, sight)
+            items += self._take_guard(line, now_s)
+            sight = self._take_predictions(line, sight)
+        items += self._tell(fleets.at(self._fleet, now_s))
+        guard = self._fleet.machines[self._base]
+        prediction = sight.prediction
+        if prediction is not None and prediction.boot_id != guard.boot_id:
+            prediction = None  # of a guard that is no more
+        events = with_items(sight.events, tuple(items), now_s)
+        self.sight = replace(
+            sight, guard=guard, prediction=prediction, events=events, leads=self._leads.lines
+        )
+        return self.sight
+
+    def acknowledge(self, alert_id: str, who: str) -> None:
+        """Tell the guard that someone has seen an alert.
+
+        Raises:
+            ConnectionFailedError: nobody answers, or the guard refuses.
+        """
+        self._ask("ack", wire.encode(wire.Ack(alert_id=alert_id, who=who)))
+
+    def shelve(self, alert_id: str, who: str, duration_s: float) -> None:
+        """Put an alert aside for a time [s]; 0 ends that.
+
+        Raises:
+            ConnectionFailedError: nobody answers, or the guard refuses.
+        """
+        order = wire.Shelve(alert_id=alert_id, who=who, duration_s=duration_s)
+        self._ask("shelve", wire.encode(order))
+
+    def close(self) -> None:
+        """End the thread (``stop`` is set by now) and the session."""
+        self._thread.join()
+        if self._line is not None:
+            self._line.bus.close()
+
+    def _ask(self, what: str, payload: bytes) -> None:
+        line = self._line
+        if line is None:
+            raise ConnectionFailedError(self._trouble)
+        if not line.bus.ask(f"{self._base}/{what}", payload):
+            raise ConnectionFailedError(f"no guard answers on {self._base}/{what}")
+
+    # the thread
+
+    def _work(self) -> None:
+        bus = Bus.open_retrying(self._site.zenoh, self._stop, self._cannot, self._stop.wait)
+        if bus is None:
+            return
+        self._trouble = ""
+        self._line = self._subscribe(bus)
+        while not self._stop.wait(_ASK_S):
+            self._trouble = "" if bus.connected else "no Zenoh router"
+            if self._fleet.machines[self._base].behind:
+                self._catch_up(bus)
+
+    def _cannot(self, why: str) -> None:
+        self._trouble = why
+
+    def _subscribe(self, bus: Bus) -> _Line:
+        keys, base = self._site.keys, self._base
+        return _Line(
+            bus=bus,
+            joystick=bus.inbox(keys.joystick, _CAPACITY),
+            actuators=bus.inbox(keys.actuators, _CAPACITY),
+            alerts=bus.inbox(f"{base}/alert", _CAPACITY),
+            predictions=bus.inbox(f"{base}/prediction", _CAPACITY),
+            beats=bus.inbox(f"{base}/heartbeat", _CAPACITY),
+            token=bus.liveness(f"{base}/alive"),
+            objects=tuple(
+                (item.name, bus.inbox(item.key or "", _CAPACITY))
+                for item in self._site.scene.moving
+            ),
+        )
+
+    def _catch_up(self, bus: Bus) -> None:
+        asked_s = time.monotonic()
+        try:
+            answers = bus.ask(f"{self._base}/state", timeout_s=_ANSWER_S)
+            for answer in answers:
+                self._answers.append((asked_s, wire.decode(answer, wire.State)))
+        except (ConnectionFailedError, MessageError):
+            return  # asked again soon, for as long as something is missing
+
+    # what `poll` does
+
+    def _take_guard(self, line: _Line, now_s: float) -> list[Item]:
+        items: list[Item] = []
+        while self._answers:
+            asked_s, state = self._answers.popleft()
+            items += self._tell(fleets.on_state(self._fleet, self._base, state, now_s, asked_s))
+        for beat in _read(line.beats, lambda p: wire.decode(p, wire.Heartbeat)):
+            items += self._tell(fleets.on_heartbeat(self._fleet, self._base, beat, now_s))
+        for alert in _read(line.alerts, lambda p: wire.decode(p, wire.Alert)):
+            self._leads = self._leads.take(alert)
+            items += self._tell(fleets.on_alert(self._fleet, self._base, alert, now_s))
+        alive = line.token.poll()
+        if alive is not None and alive is not self._token:
+            if self._token is not None or alive:  # one that never was there says nothing
+                told = fleets.on_token(self._fleet, self._base, now_s, alive=alive)
+                items += self._tell(told)
+            self._token = alive
+        return items
+
+    def _tell(self, told: Told) -> tuple[Item, ...]:
+        self._fleet, items = told
+        return items
+
+    def _take_predictions(self, line: _Line, sight: Sight) -> Sight:
+        for message in _read(line.predictions, lambda p: wire.decode(p, wire.Prediction)):
+            under_way = message.event != "ended" and message.mean is not None
+            sight = replace(sight, prediction=message if under_way else None)
+        return sight
+
+    def _take_inputs(self, line: _Line, sight: Sight) -> Sight:
+        site, now_s = self._site, sight.now_s
+        names, axes = site.actuator_names, site.guard.axes
+        levers = _read(line.joystick, lambda p: wire.decode_joystick(p, axes))
+        if levers:
+            command = [a.sign * levers[-1].axes[a.axis] for a in site.guard.actuators]
+            sight = replace(sight, command=np.array(command), command_s=now_s)
+        for moved in _read(line.actuators, lambda p: wire.decode_actuators(p, names)):
+            position = np.array(moved.position)
+            measured = None if moved.velocity is None else np.array(moved.velocity)
+            stamp_s = now_s if moved.stamp is None else moved.stamp
+            self._speed.update(ActuatorSample(stamp_s, position, measured, now_s))
+            sight = replace(sight, position=position, position_s=now_s)
+        placed, placed_s = dict(sight.placed), dict(sight.placed_s)
+        for name, inbox in line.objects:
+            poses = _read(inbox, wire.decode_object_pose)
+            if poses:
+                placed[name], placed_s[name] = _matrix(poses[-1]), now_s
+        velocity = self._speed.velocity
+        return replace(sight, velocity=velocity, placed=placed, placed_s=placed_s)
+
+
+def _read(inbox: Inbox, decoder: Callable[[bytes], T]) -> list[T]:
+    """What can be read; a viewer has nothing to say about the rest, the guard does."""
+    found = []
+    for message in inbox.drain():
+        try:
+            found.append(decoder(message.payload))
+        except MessageError:
+            continue
+    return found
+
+
+def _matrix(pose: wire.ObjectPose) -> FloatArray:
+    matrix = np.eye(4)
+    if pose.quaternion_xyzw is not None:
+        matrix[:3, :3] = Rotation.from_quat(pose.quaternion_xyzw).as_matrix()
+    elif pose.rpy_rad is not None:
+        matrix[:3, :3] = Rotation.from_euler("xyz", pose.rpy_rad).as_matrix()
+    matrix[:3, 3] = pose.xyz_m
+    return matrix
