@@ -110,14 +110,10 @@ class Sweep:
         told = found.view(np.ndarray).tolist()
         moving = bool(displacement.any())
         entries = []
-        if worst and asked is self._every and not lost:
-            if self._solid:
+        if worst:
+            together, asked = self._together(asked, lost)
+            if together:
                 entries.append(self._worst(told[0], end, moving=moving))
-            asked = self._other
-        elif worst:
-            if len(lost) < len(self._solid.intersection(asked)):
-                entries.append(self._worst(told[0], end, moving=moving))
-            asked = [i for i in asked if i not in self._solid or i in lost]
         for index in asked:
             zone = problem.zones[index]
             if isinstance(zone, ActuatorLimit):
@@ -137,6 +133,13 @@ class Sweep:
             witness=told_at,
             queries=result.queries + int(problem.scratch.spent[0]),
         )
+
+    def _together(self, asked: list[int], lost: set[int]) -> tuple[bool, list[int]]:
+        """Whether any zone is in the worst of all, and those that have an entry of their own."""
+        if asked is self._every and not lost:
+            return bool(self._solid), self._other
+        own = [i for i in asked if i not in self._solid or i in lost]
+        return len(own) < len(asked), own
 
     def _named(self, names: frozenset[str]) -> list[int]:
         return [i for i, zone in enumerate(self.problem.zones) if zone.name in names]
