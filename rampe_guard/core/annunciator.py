@@ -54,6 +54,7 @@ class Annunciator:
         self._boot_id = boot_id
         self._alarms: dict[str, Alarm] = {}
         self._evidence: dict[str, Evidence] = {}
+        self._link: dict[str, str | None] = {}
         self._published_s: dict[str, float] = {}
         self._raised_s: dict[str, float] = {}
         self._changed_s: dict[str, float] = {}
@@ -158,6 +159,8 @@ class Annunciator:
         # between cause and release the alert goes on telling of its last cause
         if found.level >= alarm.level or zone not in self._evidence:
             self._evidence[zone] = found
+            if found.level and found.sweep is not None:
+                self._link[zone] = found.sweep.link
         if changed:
             return [self._changed(zone, moment)]
         if was_active and self._due(zone, moment):
@@ -200,6 +203,7 @@ class Annunciator:
             state=alarm.state,
             quality=self._quality(zone, found, moment),
             evidence=found,
+            link=self._link.get(zone),
             prediction=moment.prediction,
             stamp_s=moment.stamp_s,
             now_s=moment.now_s,

@@ -68,6 +68,14 @@ def compose(a: FloatArray, b: FloatArray, out: FloatArray) -> None:
 
 
 @inlined
+def copy_pose(a: FloatArray, out: FloatArray) -> None:
+    """Out = a, poses (3, 4)."""
+    for i in range(3):
+        for k in range(4):
+            out[i, k] = a[i, k]
+
+
+@inlined
 def turn_joint(arm: ArmTables, j: int, theta: float, scratch: FloatArray) -> None:
     """Pose (3, 4) of joint j in its parent frame, into ``scratch``."""
     constant, sine, versine = arm.joint[j].constant, arm.joint[j].sine, arm.joint[j].versine
@@ -165,7 +173,8 @@ def reaches(
         moves: |Δθ| each joint can be away from that posture (J,).
         out: zero for joints that do not carry the link.
     """
-    out[:] = 0.0
+    for j in range(len(out)):
+        out[j] = 0.0
     cx, cy, cz, radius = ball
     between = 0.0
     j = arm.link[link].frame - 1
@@ -210,15 +219,16 @@ def motion_bounds(
     rate, curvature, bend = 0.0, 0.0, 0.0
     j = arm.link[link].frame - 1
     while j >= 0 and j + 1 != common:
-        speed = max(abs(least[j]), abs(most[j])) * size[j]
-        turning = speed if arm.joint[j].revolute == 1 else 0.0
-        i = arm.joint[j].parent - 1
-        while i >= 0 and i + 1 != common:
-            if arm.joint[i].revolute == 1:
-                turning += 2.0 * max(abs(least[i]), abs(most[i])) * size[i]
-            i = arm.joint[i].parent - 1
-        rate += speed * reach[j]
-        curvature += speed * turning * reach[j]
-        bend += (most[j] - least[j]) * size[j] * reach[j] * 0.25
+        if size[j] > 0.0:  # the slope of one that stands still may be infinite
+            speed = max(abs(least[j]), abs(most[j])) * size[j]
+            turning = speed if arm.joint[j].revolute == 1 else 0.0
+            i = arm.joint[j].parent - 1
+            while i >= 0 and i + 1 != common:
+                if arm.joint[i].revolute == 1 and size[i] > 0.0:
+                    turning += 2.0 * max(abs(least[i]), abs(most[i])) * size[i]
+                i = arm.joint[i].parent - 1
+            rate += speed * reach[j]
+            curvature += speed * turning * reach[j]
+            bend += (most[j] - least[j]) * size[j] * reach[j] * 0.25
         j = arm.joint[j].parent - 1
     return rate, curvature, bend

@@ -84,10 +84,12 @@ def _other_travel(
     frames: FloatArray,
     moves: FloatArray,
     reach: FloatArray,
+    own: FloatArray,
     k: Records,
 ) -> float:
     """How far the second link of a self-collision pair can move [m]; ``reach`` gets both."""
-    own = reach.copy()
+    for j in range(len(moves)):
+        own[j] = reach[j]
     ball = S.node[pair.b].ball
     link_pose(arm, frames, pair.other, k.pose)
     x, y, z = moved(k.pose, ball[0], ball[1], ball[2])
@@ -108,6 +110,7 @@ def _decide(
     frames: FloatArray,
     moves: FloatArray,
     reach: FloatArray,
+    own: FloatArray,
     k: Records,
 ) -> tuple[int, float]:
     """Whether one pair is clear in a box (FREE), touches at its center (POSSIBLE), or neither.
@@ -125,7 +128,7 @@ def _decide(
     for j in range(len(moves)):
         travel += reach[j] * moves[j]
     if pair.other >= 0:
-        other_travel = _other_travel(arm, S, pair, frames, moves, reach, k)
+        other_travel = _other_travel(arm, S, pair, frames, moves, reach, own, k)
         travel += other_travel
     margin = zone.margin
     k.node[0, 0], k.node[0, 1] = pair.a, pair.b
@@ -202,8 +205,8 @@ def any_way(
     """
     actuators = box.shape[2]
     joints = len(arm.joint)
-    theta, moves, reach = np.empty(joints), np.empty(joints), np.empty(joints)
-    share = np.empty(actuators)
+    theta, moves, reach, own = path.joint[0], path.joint[1], path.joint[2], path.joint[3]
+    share, here = path.share, path.box
     count = 0
     for z in range(len(zones)):
         if zones[z].active == 1:
@@ -223,11 +226,14 @@ def any_way(
         for m in range(top - 1):
             if span[m, 2] < span[best, 2]:
                 best = m
-        here = box[best].copy()
+        for side in range(2):
+            for i in range(actuators):
+                here[side, i] = box[best, side, i]
+                box[best, side, i] = box[top - 1, side, i]
         first, many = int(span[best, 0]), int(span[best, 1])
         top -= 1
-        box[best] = box[top]
-        span[best] = span[top]
+        for m in range(3):
+            span[best, m] = span[top, m]
         for j in range(joints):
             i = arm.joint[j].actuator
             low, high = here[0, i], here[1, i]
@@ -242,7 +248,7 @@ def any_way(
         for m in range(first, first + many):
             p = int(pool[m])
             found, near = _decide(
-                arm, S, pairs.row[p], zones[pairs.row[p].zone], path.now[0], moves, reach, k
+                arm, S, pairs.row[p], zones[pairs.row[p].zone], path.now[0], moves, reach, own, k
             )
             if found == POSSIBLE:
                 for i in range(actuators):
@@ -256,20 +262,26 @@ def any_way(
             left += 1
             nearest = min(nearest, near)
             total = 0.0
-            share[:] = 0.0
+            for i in range(actuators):
+                share[i] = 0.0
             for j in range(joints):
                 total += reach[j] * moves[j]
                 share[arm.joint[j].actuator] += reach[j] * moves[j]
             if total > most:
                 most = total
-                widest = int(np.argmax(share))
+                widest = 0
+                for i in range(1, actuators):
+                    if share[i] > share[widest]:
+                        widest = i
         if left == 0:
             continue
         if most < finest:
             verdict = UNKNOWN  # so near that it cannot be told; a real contact is still looked for
             continue
         for side in range(2):
-            box[top + side] = here
+            for end in range(2):
+                for i in range(actuators):
+                    box[top + side, end, i] = here[end, i]
             box[top + side, 1 - side, widest] = 0.5 * (here[0, widest] + here[1, widest])
             span[top + side, 0], span[top + side, 1], span[top + side, 2] = used, left, nearest
         used += left

@@ -13,20 +13,21 @@ if TYPE_CHECKING:
     from rampe_guard.core.types import FloatArray
 
 
-def broad_tree(balls: FloatArray, zones: list[int]) -> Records:
-    """Balls (k, 4) of so many zones, halved across their longest extent down to single ones."""
+def broad_tree(boxes: FloatArray, zones: list[int]) -> Records:
+    """Boxes (k, 6) of so many zones, halved across their longest extent down to single ones."""
     nodes = room(BROAD, max(2 * len(zones) - 1, 0))
     todo = [(0, np.arange(len(zones)))] if zones else []
     used = 1
     while todo:
         number, items = todo.pop()
         node = nodes[number]
-        node.ball = _round(balls[items])
+        node.box[:3] = boxes[items, :3].min(axis=0)
+        node.box[3:] = boxes[items, 3:].max(axis=0)
         node.left = node.right = node.zone = NONE
         if len(items) == 1:
             node.zone = zones[items[0]]
             continue
-        centers = balls[items, :3]
+        centers = boxes[items, :3] + boxes[items, 3:]
         axis = int(np.argmax(np.ptp(centers, axis=0)))
         items = items[np.argsort(centers[:, axis], kind="stable")]
         node.left, node.right = used, used + 1
@@ -34,14 +35,3 @@ def broad_tree(balls: FloatArray, zones: list[int]) -> Records:
         todo += [(used, items[:half]), (used + 1, items[half:])]
         used += 2
     return nodes
-
-
-def _round(balls: FloatArray) -> FloatArray:
-    """A ball round balls (k, 4)."""
-    if len(balls) == 1:
-        return np.asarray(balls[0])
-    low = (balls[:, :3] - balls[:, 3:]).min(axis=0)
-    high = (balls[:, :3] + balls[:, 3:]).max(axis=0)
-    center = 0.5 * (low + high)
-    reach = np.linalg.norm(balls[:, :3] - center, axis=1) + balls[:, 3]
-    return np.append(center, float(reach.max()) * (1.0 + 1e-12))

@@ -71,7 +71,8 @@ class PredictionSummary:
 class AlertEvent:
     """An alert to publish: a transition, or a repeat of one that is active.
 
-    Times are on the clock of ``now_s`` [s], but for ``stamp_s``.
+    ``link`` is that of the last cause: an alert that clears tells of the link that it was about,
+    while ``evidence`` is of now. Times are on the clock of ``now_s`` [s], but for ``stamp_s``.
     """
 
     kind: Literal["transition", "repeat"]
@@ -83,6 +84,7 @@ class AlertEvent:
     state: State
     quality: Quality
     evidence: Evidence
+    link: str | None
     prediction: PredictionSummary | None
     stamp_s: float | None
     now_s: float

@@ -7,12 +7,14 @@ the point counts as inside, for what could not be computed is never free.
 from __future__ import annotations
 
 import math
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from rampe_guard.core.compiled import inlined
 from rampe_guard.core.kernel_data import Shapes
 from rampe_guard.core.types import FloatArray
+
+if TYPE_CHECKING:
+    from rampe_guard.core.bounding_tree import Int32Array
 
 RAYS = (
     (0.5773, 0.2113, 0.7887),
@@ -24,7 +26,6 @@ RAYS = (
 )
 EDGE = 1e-9
 """Barycentric distance from an edge below which a crossing is not trusted."""
-DEPTH = 128
 
 
 @inlined
@@ -76,13 +77,15 @@ def _meets(
 
 
 @inlined
-def inside(S: Shapes, root: int, x: float, y: float, z: float) -> bool:
-    """Whether a point, in the tree's own frame, lies inside the closed parts of its surface."""
+def inside(S: Shapes, root: int, x: float, y: float, z: float, stack: Int32Array) -> bool:
+    """Whether a point, in the tree's own frame, lies inside the closed parts of its surface.
+
+    ``stack`` is room for numbers of nodes.
+    """
     ball = S.node[root].ball
     px, py, pz = ball[0] - x, ball[1] - y, ball[2] - z
     if px * px + py * py + pz * pz > ball[3] * ball[3]:
         return False
-    stack = np.empty(DEPTH, dtype=np.int32)
     for k in range(len(RAYS)):
         ray = RAYS[k]
         square = ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2]
@@ -96,7 +99,7 @@ def inside(S: Shapes, root: int, x: float, y: float, z: float) -> bool:
             if not _meets(S.node[node].ball, x, y, z, ray, square):
                 continue
             if S.node[node].left >= 0:
-                if top + 2 > DEPTH:
+                if top + 2 > len(stack):
                     unsure = True
                     break
                 stack[top] = S.node[node].left

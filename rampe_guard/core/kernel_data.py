@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 Records: TypeAlias = Any
 """A record array of one of the types below, or one record of it."""
 
+FAR = 1e30
+"""Farther than anything: no bound is known, or any proof will do."""
 CELLS = 8
 """Most cells of a path's grid."""
 STACK = 1024
@@ -92,6 +94,9 @@ ZONE = np.dtype(
     [
         ("margin", "f8"),  # keep-out distance, growth included
         ("pose", "f8", _POSE),  # of its geometry in the world
+        ("center", "f8", 3),  # of a box round its geometry, in its own frame
+        ("half", "f8", 3),
+        ("boxed", "i4"),  # whether there is such a box
         ("active", "i4"),  # asked about
         ("first", "i4"),  # its pairs are rows first … last - 1
         ("last", "i4"),
@@ -135,6 +140,7 @@ SCRATCH = np.dtype(
         ("pose_b", "f8", (2, *_POSE)),
         ("pose", "f8", _POSE),
         ("far", "f8", 2),  # see walk_kernel.push_halves
+        ("stack", "i4", STACK),  # of nodes, where one tree is walked
         ("spent", "i8", 2),  # queries so far, and their limit
         ("cells", "i8"),  # of the path's grid
         ("again", "i8"),  # 1: the pairs' last directions are worth a try
@@ -193,10 +199,11 @@ class ArmTables(NamedTuple):
 
 
 BROAD = np.dtype(
-    [("left", "i4"), ("right", "i4"), ("zone", "i4"), ("ball", "f8", 4)],
+    [("left", "i4"), ("right", "i4"), ("zone", "i4"), ("box", "f8", 6)],
     align=True,
 )
-"""A node of the tree of zones: a ball round its zones, margins included; zone NONE: not a leaf."""
+"""A node of the tree of zones: a box (least, most) round its zones, margins included; zone NONE:
+not a leaf."""
 
 
 class Pairs(NamedTuple):
@@ -226,10 +233,16 @@ class Path(NamedTuple):
         theta: joint values at the grid (K + 1, J).
         frames: poses of the frames at the grid (K + 1, J + 1, 3, 4).
         segment: ends of each link's capsule in the world at the grid (L, K + 1, 6) [m].
+        swept: box (least, most) round each link's capsule on the whole path (L, 6) [m].
         bounds: rate, curvature, bend per mover and cell (M, K, 3) [m], see `walk_kernel`.
         fastest: largest rate of each mover (M,) [m].
         now: frames at two fractions (2, J + 1, 3, 4).
         now_theta: its joint values (J,).
+        joint: room for numbers per joint (6, J).
+        share: room for numbers per actuator (n,).
+        box: room for two corners (2, n).
+        pose: room for poses (2, 3, 4).
+        box_room: room for a box (6,).
     """
 
     way: FloatArray
@@ -237,10 +250,16 @@ class Path(NamedTuple):
     theta: FloatArray
     frames: FloatArray
     segment: FloatArray
+    swept: FloatArray
     bounds: FloatArray
     fastest: FloatArray
     now: FloatArray
     now_theta: FloatArray
+    joint: FloatArray
+    share: FloatArray
+    box: FloatArray
+    pose: FloatArray
+    box_room: FloatArray
 
 
 def empty_path(joints: int, links: int, movers: int, actuators: int) -> Path:
@@ -251,11 +270,62 @@ def empty_path(joints: int, links: int, movers: int, actuators: int) -> Path:
         theta=np.zeros((CELLS + 1, joints)),
         frames=np.zeros((CELLS + 1, joints + 1, 3, 4)),
         segment=np.zeros((links, CELLS + 1, 6)),
+        swept=np.zeros((links, 6)),
         bounds=np.zeros((movers, CELLS, 3)),
         fastest=np.zeros(movers),
         now=np.zeros((2, joints + 1, 3, 4)),
         now_theta=np.zeros(joints),
+        joint=np.zeros((6, joints)),
+        share=np.zeros(actuators),
+        box=np.zeros((2, actuators)),
+        pose=np.zeros((2, 3, 4)),
+        box_room=np.zeros(6),
     )
+
+
+class Ask(NamedTuple):
+    """What a sweep is asked.
+
+    Attributes:
+        tolerance: of a contact, in motion [m].
+        touch: a distance that counts as contact until it is refuted [m].
+        slack: to which distances are wanted [m]; more than FAR if any proof will do.
+        probe: fraction of the small first step that tells closing from opening.
+        limit: most queries.
+        together: 1 if only the worst of all zones is wanted.
+        sharp: 1 if the clearance at the start is wanted too.
+        again: 1 if the last sweep began near here, so that its directions are worth a try.
+    """
+
+    tolerance: float
+    touch: float
+    slack: float
+    probe: float
+    limit: int
+    together: int
+    sharp: int
+    again: int
+
+
+class Task(NamedTuple):
+    """One sweep: the problem, its path, room to work in, and where the answers go.
+
+    Attributes:
+        arm, S, pairs: see `kernel_data`.
+        zones: ZONE records. path: the way is set, the rest is laid out by `search`.
+        k: one SCRATCH record. doubt: DOUBT records. found: GROUP records, the answers.
+        ask: what is wanted.
+    """
+
+    arm: ArmTables
+    S: Shapes
+    pairs: Pairs
+    zones: Records
+    path: Path
+    k: Records
+    doubt: Records
+    found: Records
+    ask: Ask
 
 
 def stack_trees(trees: Sequence[BoundingTree]) -> tuple[Shapes, list[int]]:

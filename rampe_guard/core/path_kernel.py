@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from rampe_guard.core.arm_kernel import (
+    copy_pose,
     frames_of,
     joints_at,
     link_pose,
@@ -46,15 +45,12 @@ def lay_path(arm: ArmTables, S: Shapes, pairs: Pairs, path: Path, cells: int) ->
     """
     joints = len(arm.joint)
     links = len(arm.link)
-    scratch = np.empty((3, 4))
-    pose = np.empty((3, 4))
-    moves = np.empty(joints)
-    reach = np.empty(joints)
-    least = np.empty(joints)
-    most = np.empty(joints)
-    size = np.empty(joints)
+    scratch, pose = path.pose[0], path.pose[1]
+    moves, reach = path.joint[0], path.joint[1]
+    least, most, size = path.joint[2], path.joint[3], path.joint[4]
     h = path.end[0] / cells
-    path.fastest[:] = 0.0
+    for m in range(len(path.fastest)):
+        path.fastest[m] = 0.0
     for c in range(cells + 1):
         joints_at(arm, path.way, c * h, path.theta[c], joints)
         frames_of(arm, path.theta[c], path.frames[c], scratch, joints)
@@ -94,6 +90,23 @@ def lay_path(arm: ArmTables, S: Shapes, pairs: Pairs, path: Path, cells: int) ->
             bounds = path.bounds[m, c]
             bounds[0], bounds[1], bounds[2] = rate, curvature, bend
             path.fastest[m] = max(path.fastest[m], rate)
+            if pairs.mover[m].common == 0:
+                _hold(path, link, c, arm.link[link].capsule[6] + 0.5 * rate * h)
+
+
+@inlined
+def _hold(path: Path, link: int, c: int, more: float) -> None:
+    """Make a link's swept box hold its segment at both ends of a cell, grown by ``more`` [m]."""
+    box = path.swept[link]
+    for e in range(2):
+        segment = path.segment[link, c + e]
+        for i in range(3):
+            low, high = min(segment[i], segment[3 + i]), max(segment[i], segment[3 + i])
+            if c == 0 and e == 0:
+                box[i], box[3 + i] = low - more, high + more
+            else:
+                box[i] = min(box[i], low - more)
+                box[3 + i] = max(box[3 + i], high + more)
 
 
 @inlined
@@ -145,7 +158,7 @@ def place(
     if common == 0:
         link_pose(arm, frames, pair.link, pose_a)
         if pair.other < 0:
-            pose_b[:] = still
+            copy_pose(still, pose_b)
         else:
             link_pose(arm, frames, pair.other, pose_b)
         return

@@ -1,235 +1,30 @@
-"""Compiled: one path against all zones. Coarse bounds of all pairs, then walks, nearest first.
-
-Coarse bounds are those of (link capsule, ball of the other side) at the ends of each cell of the
-path: between two samples a distance is at least (d_a + d_b - motion)/2. Halfspaces are bounded by
-the capsule's lower end. Only cells that these leave in doubt are walked.
-"""
+"""Compiled: one path against all zones. Coarse bounds of all pairs, then walks, nearest first."""
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from rampe_guard.core.bounding_tree import HALFSPACE
+from rampe_guard.core.coarse_kernel import coarse, group_of
 from rampe_guard.core.compiled import compiled, inlined
-from rampe_guard.core.gjk import ROUNDING_M, halfspace_normal
+from rampe_guard.core.gjk import ROUNDING_M
 from rampe_guard.core.inside_kernel import inside
-from rampe_guard.core.kernel_data import ArmTables, Pairs, Path, Records, Shapes
+from rampe_guard.core.kernel_data import FAR, Task
 from rampe_guard.core.path_kernel import (
-    capsule_distance,
     cells_of,
     lay_path,
     move_to,
     moved,
     pair_bounds,
-    pair_fastest,
     place,
 )
-from rampe_guard.core.types import FloatArray
 from rampe_guard.core.walk_kernel import EXACT, nearest, walk
 
-FAR = 1e30
 LADDER = (1.0, 1.0 / 30.0, 1.0 / 900.0)
 """How near counts as a contact, in shares of ``touch``, as long as it is not confirmed."""
 NOISE_M = 1e-6
-
-
-class Ask(NamedTuple):
-    """What a sweep is asked.
-
-    Attributes:
-        tolerance: of a contact, in motion [m].
-        touch: a distance that counts as contact until it is refuted [m].
-        slack: to which distances are wanted [m]; more than FAR if any proof will do.
-        probe: fraction of the small first step that tells closing from opening.
-        limit: most queries.
-        together: 1 if only the worst of all zones is wanted.
-        sharp: 1 if the clearance at the start is wanted too.
-        again: 1 if the last sweep began near here, so that its directions are worth a try.
-    """
-
-    tolerance: float
-    touch: float
-    slack: float
-    probe: float
-    limit: int
-    together: int
-    sharp: int
-    again: int
-
-
-class Task(NamedTuple):
-    """One sweep: the problem, its path, room to work in, and where the answers go.
-
-    Attributes:
-        arm, S, pairs: see `kernel_data`.
-        zones: ZONE records. path: the way is set, the rest is laid out by `search`.
-        k: one SCRATCH record. doubt: DOUBT records. found: GROUP records, the answers.
-        ask: what is wanted.
-    """
-
-    arm: ArmTables
-    S: Shapes
-    pairs: Pairs
-    zones: Records
-    path: Path
-    k: Records
-    doubt: Records
-    found: Records
-    ask: Ask
-
-
-@inlined
-def _group(task: Task, p: int) -> int:
-    """The group of a pair: its zone, or the one of all zones together."""
-    return 0 if task.ask.together == 1 else task.pairs.row[p].zone
-
-
-@inlined
-def _look(task: Task, p: int) -> None:
-    """Coarse bounds of one pair: it goes on the list, or only lowers the bounds of its group."""
-    arm, S, pairs, zones, path, k, doubt, found, ask = task
-    cells = k.cells
-    h = path.end[0] / cells
-    middle = cells // 2
-    pair = pairs.row[p]
-    z = pair.zone
-    g = _group(task, p)
-    margin = zones[z].margin
-    link = pair.link
-    radius = arm.link[link].capsule[6]
-    ball = S.node[pair.b].ball
-    plane = S.node[pair.b].count == HALFSPACE
-    still = pair.other < 0
-    nx, ny, nz, floor = 0.0, 0.0, 0.0, 0.0
-    ox, oy, oz = 0.0, 0.0, 0.0
-    if plane:
-        nx, ny, nz, floor = halfspace_normal(S, S.node[pair.b].first, zones[z].pose)
-    elif still:
-        ox, oy, oz = moved(zones[z].pose, ball[0], ball[1], ball[2])
-        if ask.slack > FAR:
-            # one look at the middle of the path settles most
-            travel = max(middle, cells - middle) * h * pair_fastest(pair, path)
-            away = capsule_distance(path.segment[link, middle], radius, ox, oy, oz)
-            away -= ball[3] + travel + margin
-            if away > ask.touch:
-                _pass_over(found, g, p, away, away)
-                return
-    entry = doubt[k.doubts]
-    least, before, start = np.inf, 0.0, 0.0
-    for c in range(cells + 1):
-        segment = path.segment[link, c]
-        if plane:
-            first = nx * segment[0] + ny * segment[1] + nz * segment[2]
-            second = nx * segment[3] + ny * segment[4] + nz * segment[5]
-            away = floor - max(first, second) - radius - margin
-        else:
-            if not still:
-                ox, oy, oz = _link_center(arm, path.frames[c], pair.other, ball)
-            away = capsule_distance(segment, radius, ox, oy, oz) - ball[3] - margin
-        if c == 0:
-            start = away
-        else:
-            rate, _, _ = pair_bounds(pair, path, c - 1)
-            motion = rate * h
-            low = max(0.5 * (before + away - motion), min(before, away) - motion)
-            entry.cell[c - 1] = low
-            least = min(least, low)
-        before = away
-    if least > ask.touch and ask.slack > FAR:
-        _pass_over(found, g, p, least, start)
-        return
-    entry.pair = p
-    entry.least = least
-    entry.start = start
-    k.doubts += 1
-
-
-@inlined
-def _pass_over(found: Records, g: int, p: int, least: float, start: float) -> None:
-    """A pair that is clear all the way still bounds the distances of its group."""
-    if least < found[g].bound:
-        found[g].bound = least
-        found[g].nearest = p
-    found[g].now = min(found[g].now, start)
-
-
-@inlined
-def _coarse(task: Task) -> None:
-    """Fill in ``doubt``.
-
-    If only the worst zone is wanted, zones that stand still are found through their tree.
-    """
-    arm, _, pairs, zones, path, k, doubt, found, ask = task
-    cells = k.cells
-    middle = cells // 2
-    share = max(middle, cells - middle) * path.end[0] / cells
-    treed = ask.together == 1 and ask.slack > FAR and len(pairs.broad) > 0
-    stack = np.empty(64, dtype=np.int32)
-    k.doubts = 0
-    if treed:
-        for m in range(len(pairs.mover)):
-            link = pairs.mover[m].link
-            if pairs.mover[m].common != 0:
-                continue
-            radius = arm.link[link].capsule[6]
-            travel = share * path.fastest[m]
-            stack[0] = 0
-            top = 1
-            while top > 0:
-                top -= 1
-                node = pairs.broad[stack[top]]
-                ball = node.ball
-                away = capsule_distance(
-                    path.segment[link, middle], radius, ball[0], ball[1], ball[2]
-                )
-                away -= ball[3] + travel
-                if away > ask.touch:
-                    found[0].bound = min(found[0].bound, away)
-                    found[0].now = min(found[0].now, away)
-                elif node.zone < 0:
-                    stack[top] = node.left
-                    stack[top + 1] = node.right
-                    top += 2
-                elif zones[node.zone].active == 1 and pairs.of[node.zone, link] >= 0:
-                    p = pairs.of[node.zone, link]
-                    _look(task, p)
-    count = len(pairs.loose) if treed else len(zones)
-    for i in range(count):
-        z = pairs.loose[i] if treed else i
-        if zones[z].active == 1:
-            for p in range(zones[z].first, zones[z].last):
-                _look(task, p)
-    _sort(doubt, k.doubts)
-
-
-@inlined
-def _sort(doubt: Records, count: int) -> None:
-    """Fill in the order of the list, nearest first (Shell's sort)."""
-    for i in range(count):
-        doubt[i].order = i
-    gap = count // 2
-    while gap > 0:
-        for i in range(gap, count):
-            entry = doubt[i].order
-            least = doubt[entry].least
-            j = i
-            while j >= gap and doubt[doubt[j - gap].order].least > least:
-                doubt[j].order = doubt[j - gap].order
-                j -= gap
-            doubt[j].order = entry
-        gap //= 2
-
-
-@inlined
-def _link_center(
-    arm: ArmTables, frames: FloatArray, link: int, ball: FloatArray
-) -> tuple[float, float, float]:
-    """World center of a link's ball."""
-    x, y, z = moved(arm.link[link].origin, ball[0], ball[1], ball[2])
-    return moved(frames[arm.link[link].frame], x, y, z)
 
 
 @inlined
@@ -245,7 +40,7 @@ def _walk_all(task: Task, begin: float, aim: tuple[float, float]) -> None:
     for i in range(k.doubts):
         d = doubt[i].order
         p = doubt[d].pair
-        g = _group(task, p)
+        g = group_of(task, p)
         if (k.only >= 0 and g != k.only) or found[g].stop == 0.0:
             continue
         if slack < FAR and math.isnan(found[g].coarse):
@@ -288,7 +83,7 @@ def _seed(task: Task) -> None:
         d = doubt[i].order
         p = doubt[d].pair
         z = pairs.row[p].zone
-        g = _group(task, p)
+        g = group_of(task, p)
         if math.isnan(found[g].coarse):
             continue
         margin = zones[z].margin
@@ -317,7 +112,7 @@ def _contained(task: Task) -> None:
         if pairs.row[p].hollow == 0 or doubt[i].start > 0.0:
             continue
         z = pairs.row[p].zone
-        g = _group(task, p)
+        g = group_of(task, p)
         place(arm, path.frames[0], pairs.row[p], zones[z].pose, k.pose_a[0], k.pose_b[0], k.pose)
         a, b = pairs.row[p].a, pairs.row[p].b
         for side in range(2):
@@ -333,7 +128,7 @@ def _contained(task: Task) -> None:
                 lx = frame[0, 0] * ux + frame[1, 0] * uy + frame[2, 0] * uz
                 ly = frame[0, 1] * ux + frame[1, 1] * uy + frame[2, 1] * uz
                 lz = frame[0, 2] * ux + frame[1, 2] * uy + frame[2, 2] * uz
-                if inside(S, other, lx, ly, lz):
+                if inside(S, other, lx, ly, lz, k.stack):
                     found[g].stop = 0.0
                     hit = found[g].hit
                     hit[0], hit[1], hit[2] = p, a, b
@@ -350,7 +145,7 @@ def _zone_distance(task: Task, g: int, s: float, limits: tuple[float, float, flo
         d = doubt[i].order
         p = doubt[d].pair
         z = pairs.row[p].zone
-        if _group(task, p) != g:
+        if group_of(task, p) != g:
             continue
         if s == 0.0 and doubt[d].start >= known - slack:
             continue
@@ -393,7 +188,7 @@ def _start(task: Task, g: int) -> None:
         d = doubt[i].order
         p = doubt[d].pair
         z = pairs.row[p].zone
-        if _group(task, p) != g:
+        if group_of(task, p) != g:
             continue
         if not touched and ask.sharp == 0:
             found[g].now = min(found[g].now, doubt[d].start)
@@ -476,7 +271,7 @@ def search(task: Task) -> None:
     k.again = ask.again
     k.cells = cells_of(arm, path)
     lay_path(arm, S, pairs, path, k.cells)
-    _coarse(task)
+    coarse(task)
     _contained(task)
     g, rung, begin = 0, 0, 0.0
     k.only = -1

@@ -19,8 +19,9 @@ import numpy as np
 
 from rampe_guard.core.arm_motion import PROBE_MOTION_M, valid_end
 from rampe_guard.core.bounding_tree import NONE
+from rampe_guard.core.kernel_data import FAR, Ask, Task
 from rampe_guard.core.scene import ActuatorLimit
-from rampe_guard.core.search_kernel import FAR, Ask, Task, search
+from rampe_guard.core.search_kernel import search
 from rampe_guard.core.sweep_box import AnyWay
 from rampe_guard.core.sweep_limit import sweep_limit
 from rampe_guard.core.sweep_problem import Zone
@@ -50,6 +51,7 @@ class Sweep:
         self._last = np.full(problem.arm.lower.shape, 1e9)
         self._every = list(range(len(problem.zones)))
         self._solid = frozenset(problem.solid)
+        self._other = [i for i in self._every if i not in self._solid]
         self._group = {index: number for number, index in enumerate(problem.solid)}
         self._keyed = [
             i for i, zone in enumerate(problem.zones) if isinstance(zone, Zone) and zone.placed
@@ -109,9 +111,9 @@ class Sweep:
         moving = bool(displacement.any())
         entries = []
         if worst:
-            if len(lost) < len(self._solid.intersection(asked)):
+            together, asked = self._together(asked, lost)
+            if together:
                 entries.append(self._worst(told[0], end, moving=moving))
-            asked = [i for i in asked if i not in self._solid or i in lost]
         for index in asked:
             zone = problem.zones[index]
             if isinstance(zone, ActuatorLimit):
@@ -131,6 +133,13 @@ class Sweep:
             witness=told_at,
             queries=result.queries + int(problem.scratch.spent[0]),
         )
+
+    def _together(self, asked: list[int], lost: set[int]) -> tuple[bool, list[int]]:
+        """Whether any zone is in the worst of all, and those that have an entry of their own."""
+        if asked is self._every and not lost:
+            return bool(self._solid), self._other
+        own = [i for i in asked if i not in self._solid or i in lost]
+        return len(own) < len(asked), own
 
     def _named(self, names: frozenset[str]) -> list[int]:
         return [i for i, zone in enumerate(self.problem.zones) if zone.name in names]

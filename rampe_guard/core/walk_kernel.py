@@ -238,6 +238,11 @@ def _pose_at(
     slot: int,
 ) -> None:
     """Poses of both sides of a pair at a fraction, into a slot."""
+    cell = path.end[0] / k.cells
+    c = int(s / cell + 0.5)
+    if pair.common == 0 and s == c * cell:  # the grid knows
+        place(arm, path.frames[c], pair, still, k.pose_a[slot], k.pose_b[slot], k.pose)
+        return
     move_to(arm, path, s, pair, slot, k.pose)
     place(arm, path.now[slot], pair, still, k.pose_a[slot], k.pose_b[slot], k.pose)
 
@@ -350,23 +355,25 @@ def walk(
             c = min(int(s / cell), cells - 1)
             if (c + 1) * cell <= s and c + 1 < cells:
                 c += 1  # s is a cell's end, up to rounding
-            rest = min((c + 1) * cell, s1, found[g].stop) - s
-            if rest <= 0.0:
-                rest = min(s1, found[g].stop) - s
+            edge = min((c + 1) * cell, s1, found[g].stop)
+            if edge <= s:
+                edge = min(s1, found[g].stop)
+            rest = edge - s
             linear, longer, stray = _step(pairs.row[p], path, c, rest, room)
             if linear >= rest:
                 rate, _, _ = pair_bounds(pairs.row[p], path, c)
                 known = lower - rate * rest
                 found[g].bound = min(found[g].bound, known - rounding - margin)
-                s += rest
+                s = edge
                 continue
             there = 1 - slot
-            _pose_at(arm, pairs.row[p], path, still, k, s + longer, there)
+            beyond = edge if longer >= rest else s + longer
+            _pose_at(arm, pairs.row[p], path, still, k, beyond, there)
             ahead = gap(S, shape_a, k.pose_a[there], shape_b, k.pose_b[there], n)
             sure = min(lower, ahead) - stray - rounding
             if sure >= target:
                 found[g].bound = min(found[g].bound, sure - margin)
-                s += longer
+                s = beyond
                 slot, here = there, s
                 known = ahead if longer >= 0.5 * rest else math.nan
                 continue
@@ -409,4 +416,7 @@ def _contact_point(
     x = k.work[12, 0] - r * n[0]
     y = k.work[12, 1] - r * n[1]
     z = k.work[12, 2] - r * n[2]
-    out[0], out[1], out[2] = moved(frames[pair.common], x, y, z)
+    if pair.common == 0:  # the world's own frame
+        out[0], out[1], out[2] = x, y, z
+    else:
+        out[0], out[1], out[2] = moved(frames[pair.common], x, y, z)

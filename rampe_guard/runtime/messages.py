@@ -43,7 +43,6 @@ class Scribe:
         found, sweep, told = event.evidence, event.evidence.sweep, event.prediction
         clear = event.level is Level.CLEAR
         zone = None if event.zone == SYSTEM_ZONE else event.zone
-        link = sweep.link if sweep is not None else None
         return wire.Alert(
             alert_id=event.alert_id,
             boot_id=self.boot_id,
@@ -54,7 +53,7 @@ class Scribe:
             inhibit=event.inhibit.value,
             quality=event.quality,
             zone=zone,
-            link=link,
+            link=event.link,
             probability=None if clear else found.probability,
             time_to_collision_s=None if clear else found.time_to_collision_s,
             clearance_m=None if sweep is None else sweep.clearance_m,
@@ -77,7 +76,7 @@ class Scribe:
             shelved_until_unix_s=self._unix_or_none(event.shelved_until_s),
             expires_after_s=self.site.guard.alerts.expires_after_s,
             text=wire.alert_text(
-                link,
+                event.link,
                 zone if zone is not None else found.note,
                 found.time_to_collision_s,
                 event.level.word,

@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rampe_guard.core.compiled import inlined
+from tests.benchmarks.peers.jit import inlined
 from tests.benchmarks.peers.posing import Posing, Tables, way_of
 from tests.benchmarks.peers.walking import Cover, Walk, advance, begin, cover_of, new_walk
 

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rampe_guard.core.compiled import compiled, inlined
 from rampe_guard.core.drive import DirectDrive
 from rampe_guard.core.kinematics import ForwardKinematics, motion_coefficients
+from tests.benchmarks.peers.jit import compiled, inlined
 
 if TYPE_CHECKING:
     from rampe_guard.core.types import FloatArray

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rampe_guard.core.compiled import compiled, inlined
+from tests.benchmarks.peers.jit import compiled, inlined
 from tests.benchmarks.peers.posing import Posing, Tables, place, step, travel
 
 if TYPE_CHECKING:
