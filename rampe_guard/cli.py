@@ -45,7 +45,7 @@ def _demo(args: argparse.Namespace) -> int:
 
     from rampe_guard.programs.demo import demo
 
-    return demo(args.cycles, args.seed, Console(), stop)
+    return demo(args.cycles, args.seed, Console(), stop, args.dashboard)
 
 
 def _run(args: argparse.Namespace) -> int:
@@ -207,10 +207,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"rampe-guard {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
-    demo = commands.add_parser("demo", help="everything on this machine, with a live view")
-    demo.add_argument("--cycles", type=_positive_int, default=6, help="work cycles (default 6)")
-    demo.add_argument("--seed", type=int, default=13, help="of the operator's day (default 13)")
-    demo.set_defaults(command=_demo)
+    _demo_options(commands.add_parser("demo", help="everything on this machine, live"))
 
     run = commands.add_parser("run", help="the daemon")
     _site(run, connect=True)
@@ -356,6 +353,20 @@ def _site(parser: argparse.ArgumentParser, *, connect: bool = False) -> None:
     parser.add_argument("site", help="site file (YAML)")
     if connect:
         _connect(parser)
+
+
+def _demo_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--cycles", type=_positive_int, default=6, help="work cycles (default 6)")
+    parser.add_argument("--seed", type=int, default=13, help="of the operator's day (default 13)")
+    parser.add_argument(
+        "--dashboard",
+        type=_port,
+        nargs="?",
+        const=8080,
+        metavar="PORT",
+        help="in the browser instead, on this port (default 8080)",
+    )
+    parser.set_defaults(command=_demo)
 
 
 def _dashboard_options(parser: argparse.ArgumentParser) -> None:

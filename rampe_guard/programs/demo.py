@@ -23,6 +23,7 @@ from rampe_guard import wire
 from rampe_guard.core.alarm import Level
 from rampe_guard.errors import ConnectionFailedError
 from rampe_guard.evaluate.tally import Tally
+from rampe_guard.programs.dashboarding import need_viser
 from rampe_guard.programs.scoring import closing_table
 from rampe_guard.resources import shipped_site
 from rampe_guard.runtime.connecting import connect_to
@@ -40,7 +41,7 @@ _AFTERMATH_S = 0.3
 """How long the guard may still speak after the operator has gone home [s]."""
 
 
-def demo(cycles: int, seed: int, console: Console, stop: StopFlag) -> int:
+def demo(cycles: int, seed: int, console: Console, stop: StopFlag, port: int | None = None) -> int:
     """Run the demo; returns the exit code.
 
     Args:
@@ -48,7 +49,14 @@ def demo(cycles: int, seed: int, console: Console, stop: StopFlag) -> int:
         seed: of his day.
         console: where the screen and the summary go.
         stop: ends it early, with a summary of what there was.
+        port: of a dashboard, which takes the place of the screen: events are lines then; None
+            for none.
+
+    Raises:
+        SettingsError: a dashboard is wanted whose extra is not installed.
     """
+    if port is not None:
+        need_viser()
     endpoint = f"tcp/127.0.0.1:{_free_port()}"
     site_path = str(shipped_site("demo"))
     site = connect_to(load_site(site_path), [endpoint])
@@ -61,6 +69,11 @@ def demo(cycles: int, seed: int, console: Console, stop: StopFlag) -> int:
         # the operator waits for the guard before he begins to work
         work = ["-m", "rampe_guard.simulate.process", "--connect", endpoint]
         operator = start("operator", [*work, "--cycles", str(cycles), "--seed", str(seed)])
+        needed = [router, guard]
+        if port is not None:
+            args = ["dashboard", site_path, "--connect", endpoint, "--port", str(port)]
+            needed.append(start("dashboard", ["-m", "rampe_guard", *args]))
+            console.print(f"dashboard on http://127.0.0.1:{port}", highlight=False)
         console.print("router, guard and operator are starting; the quarry is being loaded …")
         console.print(f"anyone may listen: --connect {endpoint}", highlight=False, soft_wrap=True)
         machine = stop.unless_stopped(lambda: load_telling(site, console.print))
@@ -71,9 +84,10 @@ def demo(cycles: int, seed: int, console: Console, stop: StopFlag) -> int:
             return 0
         stack.enter_context(bus)
         observer = Observer(bus, site, machine.arm.limits)
-        score = _Score(Tally(machine.sweeper, machine.sweeper.zones), operator, [router, guard])
+        score = _Score(Tally(machine.sweeper, machine.sweeper.zones), operator, needed)
         console.print("watching; Ctrl-C ends the demo with a summary")
-        watch(observer, stop, console, score.take)
+        lines = console if port is None else Console(file=console.file, force_terminal=False)
+        watch(observer, stop, lines, score.take)
     console.print(closing_table(score.tally, None if stop() else cycles, score.loop_ms))
     return 0
 

@@ -129,7 +129,7 @@ def pressed(cab: Cab, start_s: float) -> bool:
         if (alert.body["zone"], alert.body["acked_by"]) == ("crate", "dashboard"):
             return True
     with contextlib.suppress(AssertionError):  # nothing there to press at the moment
-        cab.page.click("button:not([disabled]):not([data-disabled])[data-variant='filled']", 0.2)
+        cab.page.click("button", 0.2, text="Acknowledge")
     time.sleep(0.3)
     return False
 

@@ -171,12 +171,17 @@ class Page:
         """What a reader sees."""
         return str(self.evaluate("document.body.innerText"))
 
-    def click(self, selector: str, within_s: float = 5.0) -> None:
-        """Press the mouse on the middle of the first visible element of a CSS selector."""
+    def click(self, selector: str, within_s: float = 5.0, *, text: str = "") -> None:
+        """Press the mouse on the first visible element of a CSS selector that is not disabled.
+
+        With ``text`` only one that says just that.
+        """
         spot = self.wait(
             f"""(() => {{
                 const found = [...document.querySelectorAll({json.dumps(selector)})];
-                const element = found.find(e => e.getClientRects().length && !e.disabled);
+                const text = {json.dumps(text)};
+                const element = found.find(e => e.getClientRects().length && !e.disabled
+                    && (!text || e.innerText.trim() === text));
                 if (!element) return null;
                 element.scrollIntoView({{block: 'center'}});
                 const r = element.getBoundingClientRect();

@@ -10,7 +10,7 @@ from PIL import Image
 
 from tests.support.browser import Page
 
-SIZE = (900, 560)
+SIZE = (760, 440)
 """Of the window [px]: software draws it."""
 PANEL = 400
 TOP = 100
