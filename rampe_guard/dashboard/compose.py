@@ -80,14 +80,14 @@ def _banner(sight: Sight) -> Banner:
     protection = Protection.UNAVAILABLE if sight.trouble else guard.protection
     why = sight.trouble or "; ".join(guard.reasons)
     if protection is Protection.MACHINE_OFF:
-        return Banner(Tone.LOST, "MACHINE OFF", "not monitored", detail=WORK_ALONE)
+        return Banner(Tone.OFF, Tone.OFF.look.word, "not monitored", detail=WORK_ALONE)
     if not protection.guarded:
         text = why or "the guard gave no reason"
-        word = Tone.LOST.look.word
         if protection is Protection.UNAVAILABLE:
-            word = "NOT MONITORING"
             text = f"protection unavailable: {text}"
-        return Banner(Tone.LOST, word, text, detail=WORK_ALONE)
+        seen = any(a.zone is None and a.state == "acked" for a in guard.alerts)
+        word = Tone.LOST.look.word
+        return Banner(Tone.LOST, word, text, detail=WORK_ALONE, flash=not seen)
     degraded = f"degraded: {why}" if protection is Protection.DEGRADED else ""
     if not guard.active:
         shelved = _count(len(guard.shelved), "alert shelved", "alerts shelved")

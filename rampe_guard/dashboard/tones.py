@@ -1,14 +1,17 @@
 """What a level looks like: colour, and beside it always a shape and a word.
 
-========  =======  ==============  ======================================================
+========  =======  ==============  ===================================
 tone      shape    colour          pulse while nobody has acknowledged
-========  =======  ==============  ======================================================
+========  =======  ==============  ===================================
 calm      ·        grey            none
-caution   ◆        yellow          none
-warning   ▲        yellow          once a second
+caution   ◇        yellow          none
+warning   △        yellow          once a second
 imminent  ■        red             four times a second
-lost      ✕        magenta/white   none: a hatched banner is enough
-========  =======  ==============  ======================================================
+lost      ✕        magenta/white   once a second (the banner's shape)
+off       ○        grey            none
+========  =======  ==============  ===================================
+
+It is the table "Colours and sounds" of the README.
 
 Nothing is green. What nobody watches over has no colour at all but the banner's own.
 """
@@ -49,10 +52,11 @@ class Tone(Enum):
     """Everything that a thing on the page can be."""
 
     CALM = Look("calm", "·", "clear", (139, 145, 153), (139, 145, 153))
-    CAUTION = Look("caution", "◆", "CAUTION", (240, 196, 0), (240, 196, 0))
-    WARNING = Look("warning", "▲", "WARNING", (255, 186, 0), (168, 118, 0), 1.0)
+    CAUTION = Look("caution", "◇", "CAUTION", (240, 196, 0), (240, 196, 0))
+    WARNING = Look("warning", "△", "WARNING", (255, 186, 0), (168, 118, 0), 1.0)
     IMMINENT = Look("imminent", "■", "IMMINENT", (226, 18, 24), (112, 0, 6), 4.0)
-    LOST = Look("lost", "✕", "NOT MONITORING", (84, 86, 90), (84, 86, 90))
+    LOST = Look("lost", "✕", "NOT MONITORING", (84, 86, 90), (84, 86, 90), 1.0)
+    OFF = Look("off", "○", "MACHINE OFF", (84, 86, 90), (84, 86, 90))
 
     @property
     def look(self) -> Look:

@@ -146,6 +146,7 @@ def test_without_protection_nothing_looks_judged(
     assert picture.lost
     assert picture.banner.tone is Tone.LOST
     assert picture.banner.word == "NOT MONITORING"
+    assert picture.banner.flash
     assert said in picture.banner.text
     assert "Work as if there were none" in picture.banner.detail
     assert {z.tone for z in (*picture.zones, *picture.limits)} == {Tone.LOST}
@@ -168,7 +169,8 @@ def test_a_machine_switched_off_is_not_monitored_and_says_why(model: Model) -> N
     beat = structs.replace(HEARTBEAT, status="not_monitoring", reasons=(off,))
     picture = compose(model, sight(guard(beat=beat)))
     assert picture.banner.word == "MACHINE OFF"
-    assert picture.banner.tone is Tone.LOST
+    assert picture.banner.tone is Tone.OFF
+    assert not picture.banner.flash
     assert picture.lost
 
 

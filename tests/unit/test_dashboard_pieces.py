@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from msgspec import structs
 
 from rampe_guard.client.items import Protection, ProtectionLost, alert_from
-from rampe_guard.core.alarm import Level
 from rampe_guard.core.scene import Box, Capsule, Cylinder, Halfspace, Sphere
 from rampe_guard.dashboard import markup
 from rampe_guard.dashboard.happenings import KEPT_EVENTS, Leads, with_items
@@ -47,7 +46,7 @@ def test_an_alert_keeps_its_place_and_the_gravest_always_has_one(days: list[list
 
 
 def test_levels_differ_in_shape_word_and_pulse_and_none_is_green() -> None:
-    looks = [BY_LEVEL[level].look for level in Level] + [Tone.LOST.look]
+    looks = [tone.look for tone in (*BY_LEVEL.values(), Tone.LOST, Tone.OFF)]
     assert len({look.shape for look in looks}) == len(looks)
     assert len({look.word for look in looks}) == len(looks)
     assert len({look.name for look in looks}) == len(looks)
