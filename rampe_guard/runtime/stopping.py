@@ -1,4 +1,4 @@
-"""SIGINT and SIGTERM as one flag that loops look at and sleep on.
+"""SIGINT, SIGTERM and SIGHUP as one flag that loops look at and sleep on.
 
 Long work that never looks at the flag (meshes to load, say) is broken off where it stands.
 """
@@ -36,7 +36,7 @@ class StopFlag:
 
     @classmethod
     def on_signals(cls) -> Self:
-        """A flag that SIGINT and SIGTERM set (main thread only)."""
+        """A flag that SIGINT, SIGTERM and SIGHUP set (main thread only)."""
         flag = cls()
 
         def stop(_signal: int, _frame: FrameType | None) -> None:
@@ -47,6 +47,8 @@ class StopFlag:
 
         signal.signal(signal.SIGINT, stop)
         signal.signal(signal.SIGTERM, stop)
+        if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # nohup wants it ignored
+            signal.signal(signal.SIGHUP, stop)  # else a closed terminal leaves our children
         return flag
 
     def set(self) -> None:

@@ -35,7 +35,7 @@ def test_a_signal_at_any_moment_of_a_busy_loop_ends_it() -> None:
             assert process.stdout is not None
             process.stdout.readline()
             time.sleep(0.003 * k)
-            os.kill(process.pid, signal.SIGTERM)
+            os.kill(process.pid, (signal.SIGTERM, signal.SIGHUP)[k % 2])
             assert process.wait(10.0) == 0
         finally:
             process.kill()
