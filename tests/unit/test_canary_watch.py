@@ -17,8 +17,8 @@ from rampe_guard.runtime.canary_watch import PERIOD_S, TELL_S, CanaryWatch
 from rampe_guard.runtime.health import Pulse
 from rampe_guard.runtime.worker import arrived
 from rampe_guard.settings import load_site
+from tests.support.core_rig import CONFIG, LIMITS, Wall
 from tests.support.processes import BENCH
-from tests.unit.test_guard import CONFIG, LIMITS, Wall
 
 DT = 0.05
 
