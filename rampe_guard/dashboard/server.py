@@ -11,6 +11,7 @@ import logging
 import socket
 import threading
 import time
+import warnings
 from collections.abc import Sequence
 
 import viser
@@ -88,6 +89,8 @@ class Dashboard:
         self, models: Sequence[Model], feeds: Sequence[Feed], host: str, port: int
     ) -> None:
         self._models, self._feeds = models, feeds
+        # a picture may be on its way to a page that has just gone: nothing to warn of
+        warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
         self._lock = threading.Lock()
         self._pages: dict[int, Page] = {}
         self._server = _Server(host=host, port=_free(host, port), verbose=False)

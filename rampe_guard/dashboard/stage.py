@@ -101,7 +101,7 @@ class Stage:
                 "/contact/label",
                 "",
                 position=(0.0, 0.0, 2.0 * size),
-                font_screen_scale=2.2,
+                font_screen_scale=1.3,
                 anchor="bottom-center",
             )
         )
@@ -124,7 +124,7 @@ class Stage:
 
     def _look_from(self, client: viser.ClientHandle) -> None:
         middle, reach = self._model.middle, self._model.reach_m
-        client.camera.position = middle + reach * np.array([-0.58, -0.95, 0.70])
+        client.camera.position = middle + reach * np.array([-0.66, -1.0, 0.72])
         client.camera.look_at = middle + reach * np.array([0.28, 0.10, 0.16])  # it moves with it
 
     def _zone(self, solid: Solid) -> _ZoneNodes:
@@ -204,7 +204,7 @@ class Stage:
             nodes.shell.put(color=colour, visible=zone.tone is not Tone.LOST)
         nodes.label.put(
             text=zone.label,
-            font_screen_scale=1.1 if calm else 2.0,
+            font_screen_scale=1.1 if calm else 1.7,
             visible=not (calm and nodes.solid.flat and zone.known),
         )
 
