@@ -12,15 +12,19 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from rampe_guard.settings import load_site
 from tests.support import processes
 from tests.support.browser import Browser, Page, chromium
-from tests.support.dashboards import BANNER, LOST, free_port, start_dashboard
-from tests.support.ears import Ears
+from tests.support.dashboards import (
+    BANNER,
+    LOST,
+    free_port,
+    mortal_station,
+    replace_guard,
+    start_dashboard,
+)
 from tests.support.processes import BENCH, DEMO, Process, until
-from tests.support.rig import Rig
 from tests.support.sight import SIZE, Scene
-from tests.support.station import REST, Station
+from tests.support.station import Station
 
 pytest.importorskip("viser", reason="the dashboard extra is not installed")
 pytestmark = [
@@ -45,8 +49,7 @@ class Cab:
     page: Page
 
     def restart_guard(self) -> None:
-        station = self.station
-        station.guard = processes.guard(self.folder, BENCH, station.endpoint)
+        replace_guard(self.folder, self.station)
 
     def shows(self, words: str) -> None:
         self.page.wait(f"{BANNER}.includes({words!r})", SOON_S)
@@ -59,23 +62,15 @@ class Cab:
 def cab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cab]:
     """All of it; the tests below follow one another on the same page."""
     folder = tmp_path_factory.mktemp("cab")
-    site = load_site(BENCH)
-    endpoint = processes.free_endpoint()
     port = free_port()
-    with contextlib.ExitStack() as stack:
-        router = stack.enter_context(processes.router(folder, endpoint))
-        dashboard = start_dashboard(folder, endpoint, port, BENCH, DEMO)
-        page = stack.enter_context(Browser(folder, SIZE)).open(f"http://127.0.0.1:{port}")
-        ears = stack.enter_context(Ears(endpoint, site.keys.base))
-        rig = stack.enter_context(Rig(endpoint, site, REST))
-        guard = processes.guard(folder, BENCH, endpoint)
-        station = Station(site, BENCH, endpoint, router, guard, rig, ears)
+    with mortal_station(folder) as station, Browser(folder, SIZE) as browser:
+        dashboard = start_dashboard(folder, station.endpoint, port, BENCH, DEMO)
+        page = browser.open(f"http://127.0.0.1:{port}")
         made = Cab(folder, station, port, dashboard, page)
         try:
             yield made
         finally:
             made.dashboard.close()
-            station.guard.close()
         assert "Traceback" not in made.dashboard.err, made.dashboard.err
 
 

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import socket
+from collections.abc import Iterator
 from pathlib import Path
 
+from rampe_guard.settings import load_site
+from tests.support import processes
 from tests.support.browser import Page
-from tests.support.processes import Process
+from tests.support.ears import Ears
+from tests.support.processes import BENCH, Process
+from tests.support.rig import Rig
+from tests.support.station import REST, Station
 
 BANNER = "document.querySelector('.rg-banner').innerText"
 LOST = "!!document.querySelector('.rg-banner.rg-lost')"
@@ -50,6 +57,28 @@ def start_dashboard(folder: Path, endpoint: str, port: int, *sites: Path) -> Pro
         process.close()
         raise
     return process
+
+
+@contextlib.contextmanager
+def mortal_station(folder: Path) -> Iterator[Station]:
+    """A `station` whose guard may be killed and replaced: whichever it has is ended."""
+    site, endpoint = load_site(BENCH), processes.free_endpoint()
+    with (
+        processes.router(folder, endpoint) as router,
+        Ears(endpoint, site.keys.base) as ears,
+        Rig(endpoint, site, REST) as rig,
+    ):
+        guard = processes.guard(folder, BENCH, endpoint)
+        made = Station(site, BENCH, endpoint, router, guard, rig, ears)
+        try:
+            yield made
+        finally:
+            made.guard.close()
+
+
+def replace_guard(folder: Path, made: Station) -> None:
+    """Another guard, once the one before is no more."""
+    made.guard = processes.guard(folder, BENCH, made.endpoint)
 
 
 def note_changes(page: Page) -> None:
