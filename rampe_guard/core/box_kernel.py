@@ -25,9 +25,10 @@ from rampe_guard.core.bounding_tree import HALFSPACE
 from rampe_guard.core.compiled import compiled, inlined
 from rampe_guard.core.gjk import distance
 from rampe_guard.core.kernel_data import ArmTables, Pairs, Path, Records, Shapes
+from rampe_guard.core.near_kernel import LOOSE
+from rampe_guard.core.node_kernel import can_split, push_halves, radius_of, shape_of
 from rampe_guard.core.path_kernel import moved, place
 from rampe_guard.core.types import FloatArray
-from rampe_guard.core.walk_kernel import LOOSE, can_split, push_halves, radius_of, shape_of
 
 FREE, POSSIBLE, UNKNOWN = range(3)
 BOXES = 1024

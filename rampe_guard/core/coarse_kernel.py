@@ -18,6 +18,7 @@ from rampe_guard.core.bounding_tree import HALFSPACE
 from rampe_guard.core.compiled import inlined
 from rampe_guard.core.gjk import halfspace_normal
 from rampe_guard.core.kernel_data import FAR, ArmTables, Records, Task
+from rampe_guard.core.node_kernel import box_at, box_gap
 from rampe_guard.core.path_kernel import capsule_distance, moved, pair_bounds
 from rampe_guard.core.types import FloatArray
 
@@ -50,10 +51,10 @@ def _look(task: Task, p: int) -> None:
         nx, ny, nz, floor = halfspace_normal(S, S.node[pair.b].first, zones[z].pose)
     elif still:
         ox, oy, oz = moved(zones[z].pose, ball[0], ball[1], ball[2])
-        boxed = zones[z].boxed == 1
+        boxed = S.node[pair.b].half[0] < FAR
         if boxed:
-            _zone_box(zones[z], box)
-            away = box_gap(path.swept[link], box) - margin
+            box_at(zones[z].pose, S.node[pair.b], box)
+            away = box_gap(path.swept[link, 0], box) - margin
             if away > ask.touch and ask.slack > FAR:
                 _pass_over(found, g, p, away, away)
                 return
@@ -118,7 +119,7 @@ def coarse(task: Task) -> None:
             while top > 0:
                 top -= 1
                 node = pairs.broad[stack[top]]
-                away = box_gap(path.swept[link], node.box)
+                away = box_gap(path.swept[link, 0], node.box)
                 if away > ask.touch:
                     found[0].bound = min(found[0].bound, away)
                     found[0].now = min(found[0].now, away)
@@ -157,18 +158,6 @@ def _sort(doubt: Records, count: int) -> None:
 
 
 @inlined
-def box_gap(a: FloatArray, b: FloatArray) -> float:
-    """Lower bound of the distance of two boxes (least, most) (6,) [m]; negative if they overlap."""
-    square, least = 0.0, -np.inf
-    for i in range(3):
-        apart = max(b[i] - a[3 + i], a[i] - b[3 + i])
-        least = max(least, apart)
-        if apart > 0.0:
-            square += apart * apart
-    return math.sqrt(square) if least > 0.0 else float(least)
-
-
-@inlined
 def _segment_gap(segment: FloatArray, box: FloatArray) -> float:
     """The same of the box round a segment (6,)."""
     square, least = 0.0, -np.inf
@@ -179,19 +168,6 @@ def _segment_gap(segment: FloatArray, box: FloatArray) -> float:
         if apart > 0.0:
             square += apart * apart
     return math.sqrt(square) if least > 0.0 else float(least)
-
-
-@inlined
-def _zone_box(zone: Records, out: FloatArray) -> None:
-    """World box (least, most) (6,) round a zone's geometry, without its margin [m]."""
-    x, y, z = moved(zone.pose, zone.center[0], zone.center[1], zone.center[2])
-    out[0], out[1], out[2] = x, y, z
-    for i in range(3):
-        half = 0.0
-        for j in range(3):
-            half += abs(zone.pose[i, j]) * zone.half[j]
-        out[3 + i] = out[i] + half
-        out[i] -= half
 
 
 @inlined

@@ -20,10 +20,9 @@ import numpy as np
 
 from rampe_guard.core.bounding_tree import CYLINDER, HALFSPACE
 from rampe_guard.core.compiled import inlined
-from rampe_guard.core.kernel_data import Shapes
+from rampe_guard.core.kernel_data import ROUNDING_M, Shapes
 from rampe_guard.core.types import FloatArray
 
-ROUNDING_M = 1e-9
 ITERATIONS = 48
 TINY = 1e-14
 FACES = ((0, 1, 2, 3), (0, 1, 3, 2), (0, 2, 3, 1), (1, 2, 3, 0))

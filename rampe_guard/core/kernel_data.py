@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from rampe_guard.core.bounding_tree import NONE
+from rampe_guard.core.bounding_tree import CYLINDER, HALFSPACE, NONE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,6 +22,8 @@ Records: TypeAlias = Any
 
 FAR = 1e30
 """Farther than anything: no bound is known, or any proof will do."""
+ROUNDING_M = 1e-9
+"""What is taken off each proven distance, and added to each box, for rounding [m]."""
 CELLS = 8
 """Most cells of a path's grid."""
 STACK = 1024
@@ -40,6 +42,8 @@ NODE = np.dtype(
         ("radius", "f8"),
         ("bulge", "f8"),
         ("ball", "f8", 4),
+        ("center", "f8", 3),  # of a box round it, radius included
+        ("half", "f8", 3),  # infinite for a halfspace
     ],
     align=True,
 )
@@ -94,9 +98,6 @@ ZONE = np.dtype(
     [
         ("margin", "f8"),  # keep-out distance, growth included
         ("pose", "f8", _POSE),  # of its geometry in the world
-        ("center", "f8", 3),  # of a box round its geometry, in its own frame
-        ("half", "f8", 3),
-        ("boxed", "i4"),  # whether there is such a box
         ("active", "i4"),  # asked about
         ("first", "i4"),  # its pairs are rows first … last - 1
         ("last", "i4"),
@@ -233,7 +234,8 @@ class Path(NamedTuple):
         theta: joint values at the grid (K + 1, J).
         frames: poses of the frames at the grid (K + 1, J + 1, 3, 4).
         segment: ends of each link's capsule in the world at the grid (L, K + 1, 6) [m].
-        swept: box (least, most) round each link's capsule on the whole path (L, 6) [m].
+        swept: box (least, most) round each link's capsule from a cell on to the end
+            (L, K, 6) [m].
         bounds: rate, curvature, bend per mover and cell (M, K, 3) [m], see `walk_kernel`.
         fastest: largest rate of each mover (M,) [m].
         now: frames at two fractions (2, J + 1, 3, 4).
@@ -270,7 +272,7 @@ def empty_path(joints: int, links: int, movers: int, actuators: int) -> Path:
         theta=np.zeros((CELLS + 1, joints)),
         frames=np.zeros((CELLS + 1, joints + 1, 3, 4)),
         segment=np.zeros((links, CELLS + 1, 6)),
-        swept=np.zeros((links, 6)),
+        swept=np.zeros((links, CELLS, 6)),
         bounds=np.zeros((movers, CELLS, 3)),
         fastest=np.zeros(movers),
         now=np.zeros((2, joints + 1, 3, 4)),
@@ -328,6 +330,19 @@ class Task(NamedTuple):
     ask: Ask
 
 
+def boxes_of(tree: BoundingTree) -> tuple[FloatArray, FloatArray]:
+    """Centers and half sizes (N, 3) of boxes round all nodes of a tree [m]."""
+    if tree.count[0] == HALFSPACE:
+        return np.zeros((1, 3)), np.full((1, 3), np.inf)
+    if tree.count[0] == CYLINDER:
+        center, axis, one, two = tree.vertices[:4]
+        return center[None], (np.abs(axis) + np.hypot(one, two) + ROUNDING_M)[None]
+    ends = np.stack([tree.first, tree.first + tree.count], axis=1).ravel()
+    points = np.concatenate([tree.vertices, tree.vertices[-1:]])
+    low, high = np.minimum.reduceat(points, ends)[::2], np.maximum.reduceat(points, ends)[::2]
+    return 0.5 * (low + high), 0.5 * (high - low) + tree.radius[:, None] + ROUNDING_M
+
+
 def stack_trees(trees: Sequence[BoundingTree]) -> tuple[Shapes, list[int]]:
     """All trees in one, and the number of each one's root."""
     nodes = np.cumsum([0, *(tree.nodes for tree in trees)])
@@ -344,6 +359,7 @@ def stack_trees(trees: Sequence[BoundingTree]) -> tuple[Shapes, list[int]]:
         own.triangle_first = tree.triangle_first + triangles[number]
         own.triangle_count = tree.triangle_count
         own.radius, own.bulge, own.ball = tree.radius, tree.size, tree.ball
+        own.center, own.half = boxes_of(tree)
         own.inner_first[0] = inner[number]
         own.inner_count[0] = len(tree.inner)
     points = [tree.vertices for tree in trees] + [tree.corners.reshape(-1, 3) for tree in trees]

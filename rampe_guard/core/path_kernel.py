@@ -92,17 +92,23 @@ def lay_path(arm: ArmTables, S: Shapes, pairs: Pairs, path: Path, cells: int) ->
             path.fastest[m] = max(path.fastest[m], rate)
             if pairs.mover[m].common == 0:
                 _hold(path, link, c, arm.link[link].capsule[6] + 0.5 * rate * h)
+    for link in range(links):
+        for c in range(cells - 2, -1, -1):
+            box, later = path.swept[link, c], path.swept[link, c + 1]
+            for i in range(3):
+                box[i] = min(box[i], later[i])
+                box[3 + i] = max(box[3 + i], later[3 + i])
 
 
 @inlined
 def _hold(path: Path, link: int, c: int, more: float) -> None:
-    """Make a link's swept box hold its segment at both ends of a cell, grown by ``more`` [m]."""
-    box = path.swept[link]
+    """Box round a link in one cell: its segment at both ends, grown by ``more`` [m]."""
+    box = path.swept[link, c]
     for e in range(2):
         segment = path.segment[link, c + e]
         for i in range(3):
             low, high = min(segment[i], segment[3 + i]), max(segment[i], segment[3 + i])
-            if c == 0 and e == 0:
+            if e == 0:
                 box[i], box[3 + i] = low - more, high + more
             else:
                 box[i] = min(box[i], low - more)

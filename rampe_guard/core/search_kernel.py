@@ -9,9 +9,9 @@ import numpy as np
 from rampe_guard.core.bounding_tree import HALFSPACE
 from rampe_guard.core.coarse_kernel import coarse, group_of
 from rampe_guard.core.compiled import compiled, inlined
-from rampe_guard.core.gjk import ROUNDING_M
 from rampe_guard.core.inside_kernel import inside
-from rampe_guard.core.kernel_data import FAR, Task
+from rampe_guard.core.kernel_data import FAR, ROUNDING_M, Task
+from rampe_guard.core.near_kernel import EXACT, nearest
 from rampe_guard.core.path_kernel import (
     cells_of,
     lay_path,
@@ -20,11 +20,13 @@ from rampe_guard.core.path_kernel import (
     pair_bounds,
     place,
 )
-from rampe_guard.core.walk_kernel import EXACT, nearest, walk
+from rampe_guard.core.walk_kernel import walk
 
 LADDER = (1.0, 1.0 / 30.0, 1.0 / 900.0)
 """How near counts as a contact, in shares of ``touch``, as long as it is not confirmed."""
 NOISE_M = 1e-6
+RIVALS = 4
+"""Most pairs of one contact whose rates are tried."""
 
 
 @inlined
@@ -242,15 +244,25 @@ def _refute(task: Task, g: int) -> bool:
     if s == np.inf or s == 0.0:
         return True
     c = min(int(s * k.cells / path.end[0]), k.cells - 1)
-    rate, _, _ = pair_bounds(pairs.row[found[g].hit[0]], path, c)
-    ahead = min(s + (ask.tolerance / rate if rate > 0.0 else np.inf), path.end[0])
     kept = found[g].nearest
-    limits = (ask.touch, 0.0, 0.0)  # nothing farther matters
-    there = _zone_distance(task, g, ahead, limits)
+    p = found[g].hit[0]
+    settled = False
+    for _ in range(RIVALS):
+        rate, _, _ = pair_bounds(pairs.row[p], path, c)
+        ahead = min(s + (ask.tolerance / rate if rate > 0.0 else np.inf), path.end[0])
+        limits = (ask.touch, 0.0, 0.0)  # nothing farther matters
+        there = _zone_distance(task, g, ahead, limits)
+        if there > 0.0:
+            break
+        settled = True
+        found[g].confirmed = math.nan if math.isnan(there) else ahead
+        faster, _, _ = pair_bounds(pairs.row[found[g].nearest], path, c)
+        if math.isnan(there) or faster <= rate:
+            break
+        # another, faster pair touches there: it must do so within its own tolerance
+        p, settled = found[g].nearest, False
     found[g].nearest = kept
-    if there <= 0.0:
-        found[g].confirmed = ahead
-    return there <= 0.0 or math.isnan(there)
+    return settled
 
 
 @compiled

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rampe_guard.core.arm_tables import arm_tables
-from rampe_guard.core.bounding_tree import CYLINDER, HALFSPACE, NONE, BoundingTree, single
+from rampe_guard.core.bounding_tree import NONE, BoundingTree, single
 from rampe_guard.core.broad import broad_tree
-from rampe_guard.core.gjk import ROUNDING_M
 from rampe_guard.core.kernel_data import (
     DOUBT,
     GROUP,
@@ -146,7 +145,6 @@ def _pairs(  # noqa: C901 - one pass over zones and links
                     rows.append((link, zone.link, int(roots[zone.link]), common, number))
         elif isinstance(zone, Zone):
             fixed.margin[number] = zone.margin_m
-            _box(zone.tree, fixed[number])
             for link, tree in enumerate(links):
                 if tree is not None and link not in zone.ignored:
                     rows.append((link, NONE, object_root[zone.name], 0, number))
@@ -171,11 +169,11 @@ def _pairs(  # noqa: C901 - one pass over zones and links
     of = np.full((len(fixed), len(links)), NONE, dtype=np.int32)
     for p, (link, _, _, _, number) in enumerate(rows):
         of[number, link] = p
-    broad, loose = _broad(problem, of)
+    broad, loose = _broad(problem, of, row)
     return Pairs(row=row, mover=mover, broad=broad, loose=loose, of=of)
 
 
-def _broad(problem: SweepProblem, of: Int32Array) -> tuple[Records, Int32Array]:
+def _broad(problem: SweepProblem, of: Int32Array, row: Records) -> tuple[Records, Int32Array]:
     """The tree of all zones that stand still and have a box, and the rest."""
     still, loose, boxes = [], [], []
     for number, index in enumerate(problem.solid):
@@ -183,31 +181,15 @@ def _broad(problem: SweepProblem, of: Int32Array) -> tuple[Records, Int32Array]:
         pairs = of[number][of[number] != NONE]
         if not len(pairs):
             continue
-        fixed = problem.fixed[number]
-        if isinstance(zone, Zone) and not zone.placed and fixed.boxed:
+        node = problem.shapes.node[row.b[pairs[0]]]
+        if isinstance(zone, Zone) and not zone.placed and np.isfinite(node.half).all():
             still.append(number)
-            reach = fixed.half + zone.margin_m
-            boxes.append([*(fixed.center - reach), *(fixed.center + reach)])
+            reach = node.half + zone.margin_m
+            boxes.append([*(node.center - reach), *(node.center + reach)])
         else:
             loose.append(number)
     tree = broad_tree(np.array(boxes).reshape(-1, 6), still)
     return tree, np.array(loose, dtype=np.int32)
-
-
-def _box(tree: BoundingTree, zone: Records) -> None:
-    """Note the box round a tree's root, in its own frame; a halfspace has none."""
-    count = int(tree.count[0])
-    if count == HALFSPACE:
-        return
-    if count == CYLINDER:
-        center, axis, one, two = tree.vertices[tree.first[0] : tree.first[0] + 4]
-        half = np.abs(axis) + np.hypot(one, two)
-        low, high = center - half, center + half
-    else:
-        points = tree.vertices[tree.first[0] : tree.first[0] + count]
-        low, high = points.min(axis=0), points.max(axis=0)
-    zone.center, zone.half = 0.5 * (low + high), 0.5 * (high - low) + tree.radius[0] + ROUNDING_M
-    zone.boxed = bool(np.isfinite(zone.half).all())
 
 
 def _capsule(tree: BoundingTree | None) -> FloatArray:

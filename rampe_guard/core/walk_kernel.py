@@ -24,10 +24,21 @@ import math
 
 import numpy as np
 
-from rampe_guard.core.bounding_tree import HALFSPACE
 from rampe_guard.core.compiled import inlined
-from rampe_guard.core.gjk import ROUNDING_M, distance, gap
-from rampe_guard.core.kernel_data import STACK, ArmTables, Pairs, Path, Records, Shapes
+from rampe_guard.core.gjk import distance, gap
+from rampe_guard.core.kernel_data import FAR, ArmTables, Pairs, Path, Records, Shapes
+from rampe_guard.core.near_kernel import LOOSE
+from rampe_guard.core.node_kernel import (
+    box_at,
+    box_gap,
+    can_split,
+    first_direction,
+    push_halves,
+    radius_of,
+    shape_of,
+    size_of,
+    triangle_box,
+)
 from rampe_guard.core.path_kernel import (
     move_to,
     moved,
@@ -37,175 +48,10 @@ from rampe_guard.core.path_kernel import (
 )
 from rampe_guard.core.types import FloatArray
 
-LOOSE, SHARP = 0.05, 1e-3
-"""Shares of the distance to which it is wanted for nodes that can be cut, and for others."""
-EXACT = 1e-6
-"""The same where a distance is asked for itself."""
+SHARP = 1e-3
+"""Share of the distance to which it is wanted for nodes that cannot be cut."""
 TOUCH_SHARE = 0.2
 """Share of ``touch`` to which a distance near contact must be known."""
-
-
-@inlined
-def shape_of(S: Shapes, node: int) -> tuple[int, int]:
-    """First vertex and count of a node, triangles included."""
-    if node >= S.nodes:
-        return S.corner + 3 * (node - S.nodes), 3
-    return S.node[node].first, S.node[node].count
-
-
-@inlined
-def radius_of(S: Shapes, node: int) -> float:
-    """Rounding radius of a node [m]."""
-    return 0.0 if node >= S.nodes else S.node[node].radius
-
-
-@inlined
-def can_split(S: Shapes, node: int) -> bool:
-    """Whether a node is more than what it holds."""
-    return node < S.nodes and (S.node[node].left >= 0 or S.node[node].triangle_count > 0)
-
-
-@inlined
-def size_of(S: Shapes, node: int) -> float:
-    """About how far a node reaches beyond what it holds [m]; triangles are exact."""
-    return 0.0 if node >= S.nodes else S.node[node].bulge
-
-
-@inlined
-def ball_gap(S: Shapes, a: int, pose_a: FloatArray, b: int, pose_b: FloatArray) -> float:
-    """Lower bound of the distance of two nodes by the balls round them; -inf for triangles."""
-    if a >= S.nodes or b >= S.nodes or S.node[b].count == HALFSPACE:
-        return -np.inf
-    p, q = S.node[a].ball, S.node[b].ball
-    ax, ay, az = moved(pose_a, p[0], p[1], p[2])
-    bx, by, bz = moved(pose_b, q[0], q[1], q[2])
-    x, y, z = bx - ax, by - ay, bz - az
-    return float(math.sqrt(x * x + y * y + z * z) - p[3] - q[3] - ROUNDING_M)
-
-
-@inlined
-def push_halves(
-    S: Shapes,
-    k: Records,
-    top: int,
-    a: int,
-    b: int,
-    s: float,
-    n: tuple[float, float, float],
-    bar: float,
-    slot: int,
-) -> int:
-    """Put the pairs of halves of the looser node on the stack; those beyond ``bar`` are clear.
-
-    ``bar`` is what must be proven plus all motion that is left, which is in ``k.far``.
-
-    Returns:
-        The new top, negative if the stack is full.
-    """
-    cut_a = can_split(S, a)
-    if cut_a and can_split(S, b):
-        cut_a = size_of(S, a) >= size_of(S, b)
-    node = a if cut_a else b
-    if S.node[node].left >= 0:
-        first, count = -1, 2
-    else:
-        first, count = S.nodes + S.node[node].triangle_first, S.node[node].triangle_count
-    if top + count > STACK:
-        return -1
-    before = top
-    gaps = (0.0, 0.0)
-    for i in range(count):
-        half = (S.node[node].left if i == 0 else S.node[node].right) if first < 0 else first + i
-        x, y = (half, b) if cut_a else (a, half)
-        clear = ball_gap(S, x, k.pose_a[slot], y, k.pose_b[slot])
-        if clear > bar:
-            k.far[0] = min(k.far[0], clear - k.far[1])
-            continue
-        gaps = (clear, gaps[0])
-        k.node[top, 0], k.node[top, 1] = x, y
-        k.at[top, 0], k.at[top, 1], k.at[top, 2], k.at[top, 3] = s, n[0], n[1], n[2]
-        top += 1
-    if first < 0 and top - before == 2 and gaps[0] > gaps[1]:  # noqa: PLR2004
-        for i in range(2):
-            kept = k.node[top - 1, i]
-            k.node[top - 1, i] = k.node[top - 2, i]
-            k.node[top - 2, i] = kept
-    return top
-
-
-@inlined
-def _first_direction(S: Shapes, pair: Records, k: Records, slot: int) -> None:
-    """Put a first guess on the stack: the pair's last, or from center to center in a slot."""
-    way = pair.way
-    x, y, z = way[0], way[1], way[2]
-    if slot >= 0 and S.node[pair.b].count != HALFSPACE:
-        p, q = S.node[pair.a].ball, S.node[pair.b].ball
-        ax, ay, az = moved(k.pose_a[slot], p[0], p[1], p[2])
-        bx, by, bz = moved(k.pose_b[slot], q[0], q[1], q[2])
-        x, y, z = bx - ax, by - ay, bz - az
-    k.at[0, 1], k.at[0, 2], k.at[0, 3] = x, y, z
-
-
-@inlined
-def nearest(
-    arm: ArmTables,
-    S: Shapes,
-    pairs: Pairs,
-    frames: FloatArray,
-    still: FloatArray,
-    p: int,
-    k: Records,
-    limits: tuple[float, float, float],
-) -> float:
-    """Distance of a pair at one posture [m], to within ``slack``: never less than the truth.
-
-    Args:
-        arm, S, pairs: the problem.
-        frames: of the arm at that posture.
-        still: pose of the zone.
-        p: pair.
-        k: scratch.
-        limits: (known, slack, enough): nothing farther than ``known`` is of interest, and the
-            search ends at ``enough``.
-
-    Returns:
-        The distance of two points met, at most slack more than the least; ``known`` if none is
-        nearer than that less slack; NaN if the budget is gone.
-    """
-    known, slack, enough = limits
-    place(arm, frames, pairs.row[p], still, k.pose_a[0], k.pose_b[0], k.pose)
-    k.node[0, 0], k.node[0, 1] = pairs.row[p].a, pairs.row[p].b
-    _first_direction(S, pairs.row[p], k, -1 if k.again == 1 else 0)
-    top = 1
-    while top > 0:
-        top -= 1
-        a, b = k.node[top, 0], k.node[top, 1]
-        n = (k.at[top, 1], k.at[top, 2], k.at[top, 3])
-        if k.spent[0] >= k.spent[1]:
-            return math.nan
-        k.spent[0] += 1
-        rounding = radius_of(S, a) + radius_of(S, b)
-        leaf = not (can_split(S, a) or can_split(S, b))
-        bar = known - slack
-        k.far[1] = 0.0
-        share = EXACT if leaf else LOOSE
-        goal = (-np.inf if leaf else max(rounding, 0.0), bar + rounding, share)
-        lower, upper, nx, ny, nz = distance(
-            S, shape_of(S, a), k.pose_a[0], shape_of(S, b), k.pose_b[0], n, goal, k.work
-        )
-        if lower - rounding > bar:
-            continue
-        if not leaf:
-            top = push_halves(S, k, top, a, b, 0.0, (nx, ny, nz), bar, 0)
-            if top < 0:
-                return math.nan
-            continue
-        upper = max(upper - rounding, 0.0)
-        if upper < known:
-            known = upper
-            if known <= enough:
-                break
-    return known
 
 
 @inlined
@@ -284,9 +130,10 @@ def walk(
     fastest = pair_fastest(pairs.row[p], path)
     k.node[0, 0], k.node[0, 1] = pairs.row[p].a, pairs.row[p].b
     k.at[0, 0] = s0
-    _first_direction(S, pairs.row[p], k, -1)
+    first_direction(S, pairs.row[p], k, -1)
     way = pairs.row[p].way
     k.far[0] = np.inf
+    boxed = pairs.row[p].other < 0 and S.node[pairs.row[p].b].half[0] < FAR
     top = 1
     first = True
     slot = 0  # of the poses here; the other is for those ahead
@@ -299,6 +146,17 @@ def walk(
         shape_a, shape_b = shape_of(S, a), shape_of(S, b)
         rounding = radius_of(S, a) + radius_of(S, b)
         leaf = not (can_split(S, a) or can_split(S, b))
+        if boxed:
+            # where the link still goes tells more than how far it could get
+            if b >= S.nodes:
+                triangle_box(S, still, shape_b[0], path.box_room)
+            else:
+                box_at(still, S.node[b], path.box_room)
+            c = min(int(s / cell), cells - 1)
+            clear = box_gap(path.swept[pairs.row[p].link, c], path.box_room) - margin
+            if clear > max(touch, found[g].least - 0.5 * slack):
+                found[g].bound = min(found[g].bound, clear)
+                continue
         known = math.nan  # gap along n at s
         while s < min(s1, found[g].stop):
             target = margin + max(touch, found[g].least - 0.5 * slack)
@@ -306,7 +164,7 @@ def walk(
                 _pose_at(arm, pairs.row[p], path, still, k, s, slot)
                 here = s
                 if first and k.again == 0:
-                    _first_direction(S, pairs.row[p], k, slot)
+                    first_direction(S, pairs.row[p], k, slot)
                     n = (k.at[0, 1], k.at[0, 2], k.at[0, 3])
             upper = np.inf
             lower = known

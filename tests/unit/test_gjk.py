@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 from rampe_guard.core.bounding_tree import BoundingTree, cylinder, single
 from rampe_guard.core.gjk import distance
 from rampe_guard.core.kernel_data import SCRATCH, Shapes, room, stack_trees
+from rampe_guard.core.node_kernel import radius_of, shape_of
 from rampe_guard.core.types import FloatArray
-from rampe_guard.core.walk_kernel import radius_of, shape_of
 
 EYE = np.ascontiguousarray(np.eye(4)[:3])
 POINTS = 40
