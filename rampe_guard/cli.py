@@ -10,6 +10,18 @@ from collections.abc import Callable, Sequence
 
 from rampe_guard import __version__
 from rampe_guard.errors import RampeGuardError
+from rampe_guard.options import (
+    add_alert_requests,
+    add_dashboard,
+    add_demo,
+    add_model_actions,
+    add_notify,
+    add_operator,
+    add_site,
+    add_watch,
+    positive,
+    positive_int,
+)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -207,228 +219,85 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"rampe-guard {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
-    _demo_options(commands.add_parser("demo", help="everything on this machine, live"))
+    demo = commands.add_parser("demo", help="everything on this machine, live")
+    add_demo(demo)
 
     run = commands.add_parser("run", help="the daemon")
-    _site(run, connect=True)
-    _operator(run)
+    add_site(run, connect=True)
+    add_operator(run)
     run.add_argument(
         "--no-supervisor",
         dest="supervisor",
         action="store_false",
         help="one process: do not watch over it, nor start it anew after a crash",
     )
-    run.set_defaults(command=_run)
 
-    check = commands.add_parser("check", help="validate site, scene, meshes and kinematics")
-    _site(check)
-    check.set_defaults(command=_check)
+    add_site(commands.add_parser("check", help="validate site, scene, meshes and kinematics"))
 
     sweep = commands.add_parser("sweep", help="motions as JSON lines in, certificates out")
-    _site(sweep)
-    sweep.set_defaults(command=_sweep)
+    add_site(sweep)
 
     watch = commands.add_parser("watch", help="one machine, or many, on the terminal")
-    _watch_options(watch)
+    add_watch(watch)
 
-    _dashboard_options(commands.add_parser("dashboard", help="machines in the browser, in 3D"))
+    dashboard = commands.add_parser("dashboard", help="machines in the browser, in 3D")
+    add_dashboard(dashboard)
 
     notify = commands.add_parser("notify", help="alerts to commands, URLs and a sound")
-    _notify_options(notify)
-    notify.set_defaults(command=_notify)
+    add_notify(notify)
 
     replay = commands.add_parser("replay", help="a CSV log through the guard")
-    _site(replay, connect=True)
+    add_site(replay, connect=True)
     replay.add_argument("log", help="CSV file; columns as the site file's 'log' says")
     replay.add_argument("--live", action="store_true", help="publish it onto Zenoh instead")
-    replay.add_argument("--speed", type=_positive, default=1.0, help="with --live (default 1)")
+    replay.add_argument("--speed", type=positive, default=1.0, help="with --live (default 1)")
     replay.add_argument("--repeats", action="store_true", help="also print repeats of alerts")
-    replay.set_defaults(command=_replay)
 
     evaluate = commands.add_parser("evaluate", help="how good forecasts are on recorded work")
-    _site(evaluate)
+    add_site(evaluate)
     evaluate.add_argument("log", nargs="+", help="CSV files of one operator, in order of time")
     evaluate.add_argument("--out", default="evaluation", help="folder (default evaluation/)")
     evaluate.add_argument("--fresh", action="store_true", help="learn each log from nothing")
-    evaluate.set_defaults(command=_evaluate)
 
     paper = commands.add_parser("paper", help="the paper's experiment: figures, table, page")
     paper.add_argument("--out", default="paper", help="folder for the results (default paper)")
-    paper.add_argument("--seeds", type=_positive_int, default=20, help="runs (default 20)")
-    paper.add_argument("--cycles", type=_positive_int, default=23, help="of a run (default 23)")
-    paper.add_argument("--seed", type=_positive_int, default=1, help="of the first run (default 1)")
-    paper.set_defaults(command=_paper)
+    paper.add_argument("--seeds", type=positive_int, default=20, help="runs (default 20)")
+    paper.add_argument("--cycles", type=positive_int, default=23, help="of a run (default 23)")
+    paper.add_argument("--seed", type=positive_int, default=1, help="of the first run (default 1)")
 
     model = commands.add_parser("model", help="what is kept of an operator's way of working")
-    _model_actions(model)
+    add_model_actions(model)
 
     schema = commands.add_parser("schema", help="JSON Schemas of messages and files, AsyncAPI")
     schema.add_argument(
         "name", nargs="?", help="one of them, such as rampe.alert.v1, or asyncapi: keys and QoS"
     )
     schema.add_argument("--out", metavar="FOLDER", help="write the message contract there instead")
-    schema.set_defaults(command=_schema)
 
-    _alert_requests(
-        commands.add_parser("ack", help="acknowledge an alert"),
-        commands.add_parser("shelve", help="silence an alert for a short while"),
-    )
+    ack = commands.add_parser("ack", help="acknowledge an alert")
+    shelve = commands.add_parser("shelve", help="silence an alert for a short while")
+    add_alert_requests(ack, shelve)
+    for name, command in _COMMANDS.items():
+        commands.choices[name].set_defaults(command=command)
     return parser
 
 
-def _watch_options(watch: argparse.ArgumentParser) -> None:
-    watch.add_argument("site", nargs="*", help="site files (YAML); one alone is shown in detail")
-    watch.add_argument(
-        "--base",
-        action="append",
-        default=[],
-        metavar="KEYEXPR",
-        help="guards by the prefix of their keys, such as 'rampe/*/*/guard'",
-    )
-    _connect(watch)
-    watch.add_argument("--bell", action="store_true", help="ring the terminal's bell")
-    watch.add_argument("--json", action="store_true", help="one JSON object a line, for scripts")
-    watch.set_defaults(command=_watch)
-
-
-def _notify_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("site", nargs="?", help="site file (YAML): its machine, its network")
-    parser.add_argument(
-        "--base",
-        action="append",
-        default=[],
-        metavar="KEYEXPR",
-        help="machines by the prefix of their guards' keys, such as 'rampe/*/*/guard'",
-    )
-    _connect(parser)
-    parser.add_argument(
-        "--at-least",
-        choices=("caution", "warning", "imminent"),
-        default="warning",
-        help="level from which on to tell (default warning); lost protection is always told",
-    )
-    parser.add_argument(
-        "--command",
-        action="append",
-        default=[],
-        dest="commands",
-        metavar="LINE",
-        help="run it, without a shell; {text}, {level} and more are replaced, JSON on its stdin",
-    )
-    parser.add_argument(
-        "--post", action="append", default=[], metavar="URL", help="post JSON to it"
-    )
-    parser.add_argument(
-        "--sound",
-        metavar="PLAYER",
-        help="play a WAV file with it until acknowledged, such as 'aplay -q'; or: bell",
-    )
-    parser.add_argument(
-        "--timeout", type=_positive, default=5.0, help="of each try, in seconds (default 5)"
-    )
-    parser.add_argument(
-        "--per-minute",
-        type=_positive,
-        default=60.0,
-        help="what each command and URL may get in the long run (default 60)",
-    )
-
-
-def _model_actions(model: argparse.ArgumentParser) -> None:
-    actions = model.add_subparsers(required=True, metavar="ACTION", dest="action")
-    for action, text in (
-        ("show", "print what was learned"),
-        ("reset", "delete it, for good"),
-        ("export", "print it as JSON"),
-    ):
-        parser = actions.add_parser(action, help=text)
-        _site(parser)
-        _operator(parser)
-        if action == "reset":
-            parser.add_argument("--yes", action="store_true", help="needed on a terminal")
-        parser.set_defaults(command=_model)
-
-
-def _site(parser: argparse.ArgumentParser, *, connect: bool = False) -> None:
-    parser.add_argument("site", help="site file (YAML)")
-    if connect:
-        _connect(parser)
-
-
-def _demo_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--cycles", type=_positive_int, default=6, help="work cycles (default 6)")
-    parser.add_argument("--seed", type=int, default=13, help="of the operator's day (default 13)")
-    parser.add_argument(
-        "--dashboard",
-        type=_port,
-        nargs="?",
-        const=8080,
-        metavar="PORT",
-        help="in the browser instead, on this port (default 8080)",
-    )
-    parser.set_defaults(command=_demo)
-
-
-def _dashboard_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("site", nargs="+", help="site files (YAML), one per machine")
-    _connect(parser)
-    parser.add_argument("--host", default="127.0.0.1", help="to listen on (default 127.0.0.1)")
-    parser.add_argument("--port", type=_port, default=8080, help="0: any free (default 8080)")
-    parser.set_defaults(command=_dashboard)
-
-
-def _connect(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--connect",
-        action="append",
-        default=[],
-        metavar="ENDPOINT",
-        help="Zenoh endpoint instead of the site file's, such as tcp/127.0.0.1:7447",
-    )
-
-
-def _alert_requests(ack: argparse.ArgumentParser, shelve: argparse.ArgumentParser) -> None:
-    for parser, who in ((ack, "who has seen it"), (shelve, "who wants it silent")):
-        _site(parser, connect=True)
-        parser.add_argument("alert", help="its alert_id")
-        parser.add_argument("--who", required=True, help=who)
-    ack.set_defaults(command=_ack)
-    text = "for how long; 0 ends its silence"
-    shelve.add_argument("--for", type=_seconds, required=True, metavar="SECONDS", help=text)
-    shelve.set_defaults(command=_shelve)
-
-
-def _operator(parser: argparse.ArgumentParser) -> None:
-    text = "who is at the levers, instead of whom the site file names"
-    parser.add_argument("--operator", metavar="NAME", help=text)
-
-
-def _seconds(text: str) -> float:
-    value = float(text)
-    if not 0.0 <= value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text} is not 0 or above")
-    return value
-
-
-def _positive(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text} is not above 0")
-    return value
-
-
-def _port(text: str) -> int:
-    value = int(text)
-    if not 0 <= value <= 65535:  # noqa: PLR2004 - what TCP has
-        raise argparse.ArgumentTypeError(f"{value} is no port")
-    return value
-
-
-def _positive_int(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"{text} is not above 0")
-    return value
+_COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
+    "demo": _demo,
+    "run": _run,
+    "check": _check,
+    "sweep": _sweep,
+    "watch": _watch,
+    "dashboard": _dashboard,
+    "notify": _notify,
+    "replay": _replay,
+    "evaluate": _evaluate,
+    "paper": _paper,
+    "model": _model,
+    "schema": _schema,
+    "ack": _ack,
+    "shelve": _shelve,
+}
 
 
 if __name__ == "__main__":

@@ -1,0 +1,167 @@
+"""Options of the command line that several commands share, or that are many."""
+
+from __future__ import annotations
+
+import argparse
+
+
+def add_watch(watch: argparse.ArgumentParser) -> None:
+    """Machines, and how they are shown."""
+    watch.add_argument("site", nargs="*", help="site files (YAML); one alone is shown in detail")
+    watch.add_argument(
+        "--base",
+        action="append",
+        default=[],
+        metavar="KEYEXPR",
+        help="guards by the prefix of their keys, such as 'rampe/*/*/guard'",
+    )
+    add_connect(watch)
+    watch.add_argument("--bell", action="store_true", help="ring the terminal's bell")
+    watch.add_argument("--json", action="store_true", help="one JSON object a line, for scripts")
+
+
+def add_notify(parser: argparse.ArgumentParser) -> None:
+    """Machines, and whom to tell of their alerts."""
+    parser.add_argument("site", nargs="?", help="site file (YAML): its machine, its network")
+    parser.add_argument(
+        "--base",
+        action="append",
+        default=[],
+        metavar="KEYEXPR",
+        help="machines by the prefix of their guards' keys, such as 'rampe/*/*/guard'",
+    )
+    add_connect(parser)
+    parser.add_argument(
+        "--at-least",
+        choices=("caution", "warning", "imminent"),
+        default="warning",
+        help="level from which on to tell (default warning); lost protection is always told",
+    )
+    parser.add_argument(
+        "--command",
+        action="append",
+        default=[],
+        dest="commands",
+        metavar="LINE",
+        help="run it, without a shell; {text}, {level} and more are replaced, JSON on its stdin",
+    )
+    parser.add_argument(
+        "--post", action="append", default=[], metavar="URL", help="post JSON to it"
+    )
+    parser.add_argument(
+        "--sound",
+        metavar="PLAYER",
+        help="play a WAV file with it until acknowledged, such as 'aplay -q'; or: bell",
+    )
+    parser.add_argument(
+        "--timeout", type=positive, default=5.0, help="of each try, in seconds (default 5)"
+    )
+    parser.add_argument(
+        "--per-minute",
+        type=positive,
+        default=60.0,
+        help="what each command and URL may get in the long run (default 60)",
+    )
+
+
+def add_model_actions(model: argparse.ArgumentParser) -> None:
+    """What to do with what was learned."""
+    actions = model.add_subparsers(required=True, metavar="ACTION", dest="action")
+    for action, text in (
+        ("show", "print what was learned"),
+        ("reset", "delete it, for good"),
+        ("export", "print it as JSON"),
+    ):
+        parser = actions.add_parser(action, help=text)
+        add_site(parser)
+        add_operator(parser)
+        if action == "reset":
+            parser.add_argument("--yes", action="store_true", help="needed on a terminal")
+
+
+def add_site(parser: argparse.ArgumentParser, *, connect: bool = False) -> None:
+    """The site file, and another network than it names."""
+    parser.add_argument("site", help="site file (YAML)")
+    if connect:
+        add_connect(parser)
+
+
+def add_demo(parser: argparse.ArgumentParser) -> None:
+    """How long, and on which screen."""
+    parser.add_argument("--cycles", type=positive_int, default=6, help="work cycles (default 6)")
+    parser.add_argument("--seed", type=int, default=13, help="of the operator's day (default 13)")
+    parser.add_argument(
+        "--dashboard",
+        type=port,
+        nargs="?",
+        const=8080,
+        metavar="PORT",
+        help="in the browser instead, on this port (default 8080)",
+    )
+
+
+def add_dashboard(parser: argparse.ArgumentParser) -> None:
+    """Machines, and where the page is served."""
+    parser.add_argument("site", nargs="+", help="site files (YAML), one per machine")
+    add_connect(parser)
+    parser.add_argument("--host", default="127.0.0.1", help="to listen on (default 127.0.0.1)")
+    parser.add_argument("--port", type=port, default=8080, help="0: any free (default 8080)")
+
+
+def add_connect(parser: argparse.ArgumentParser) -> None:
+    """Zenoh endpoints."""
+    parser.add_argument(
+        "--connect",
+        action="append",
+        default=[],
+        metavar="ENDPOINT",
+        help="Zenoh endpoint instead of the site file's, such as tcp/127.0.0.1:7447",
+    )
+
+
+def add_alert_requests(ack: argparse.ArgumentParser, shelve: argparse.ArgumentParser) -> None:
+    """Which alert, and who asks."""
+    for parser, who in ((ack, "who has seen it"), (shelve, "who wants it silent")):
+        add_site(parser, connect=True)
+        parser.add_argument("alert", help="its alert_id")
+        parser.add_argument("--who", required=True, help=who)
+    text = "for how long; 0 ends its silence"
+    shelve.add_argument("--for", type=seconds, required=True, metavar="SECONDS", help=text)
+
+
+def add_operator(parser: argparse.ArgumentParser) -> None:
+    """Who is working."""
+    text = "who is at the levers, instead of whom the site file names"
+    parser.add_argument("--operator", metavar="NAME", help=text)
+
+
+def seconds(text: str) -> float:
+    """A time [s], 0 too."""
+    value = float(text)
+    if not 0.0 <= value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not 0 or above")
+    return value
+
+
+def positive(text: str) -> float:
+    """A number above 0."""
+    value = float(text)
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not above 0")
+    return value
+
+
+def port(text: str) -> int:
+    """A TCP port; 0 is any free one."""
+    value = int(text)
+    if not 0 <= value <= 65535:  # noqa: PLR2004 - what TCP has
+        raise argparse.ArgumentTypeError(f"{value} is no port")
+    return value
+
+
+def positive_int(text: str) -> int:
+    """A whole number above 0."""
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{text} is not above 0")
+    return value
