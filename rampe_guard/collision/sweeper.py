@@ -103,6 +103,7 @@ class FclSweeper:
         *,
         any_path: bool = False,
         clearance: bool = True,
+        wider_m: float = 0.0,
         only: frozenset[str] | None = None,
         placed: Mapping[str, Placement | None] | None = None,
         worst: bool = False,
@@ -115,6 +116,8 @@ class FclSweeper:
             any_path: also ask whether any monotone way to the end could touch.
             clearance: also find how near free zones come; without it they are sooner done and
                 ``clearance_m`` is only what certifying them proved.
+            wider_m: certificates are about margins of solid zones wider by so much [m];
+                clearances still count from the margins themselves.
             only: names of the zones that are asked about; None asks about all.
             placed: where the keyed objects stand; one without a placement is unknown.
             worst: only the worst of all solid zones is wanted.
@@ -127,12 +130,13 @@ class FclSweeper:
             start,
             displacement,
             clearance=clearance,
+            wider_m=wider_m,
             any_path=any_path,
             only=only,
             placed=placed,
             worst=worst,
         )
-        if any(_to_be_confirmed(entry) for entry in result.zones):
+        if wider_m == 0.0 and any(_to_be_confirmed(entry) for entry in result.zones):
             told = [self._confirmed(e, start, displacement, placed or {}) for e in result.zones]
             result = replace(result, zones=tuple(told))
         return replace(result, elapsed_ms=1e3 * (perf_counter() - begin))

@@ -276,7 +276,7 @@ class Guard:
                     zone = replace(zone, closing=True)  # whatever the arm does
                 shown = self._annunciator.shown(zone.zone)
                 if shown and self._rules.grazes(zone):
-                    zone = self._sharper(q, forecast, zone, placed)
+                    zone = self._surer(q, forecast, zone, placed)
                 found = self._rules.judge(forecast, zone, shown, stop_s)
                 evidence.setdefault(zone.zone, []).append(found)
                 sweeps.append(_summary(forecast, zone))
@@ -301,18 +301,33 @@ class Guard:
         health = self._monitor.health(now_s, more, off=self._off)
         return replace(health, objects=self._moving.health(now_s)) if self._moving else health
 
-    def _sharper(
+    def _surer(
         self,
         q: FloatArray,
         forecast: Forecast,
         zone: ZoneSweep,
         placed: dict[str, Placement | None],
     ) -> ZoneSweep:
-        """A free zone with its true clearance: a weak bound must not hold an alert."""
-        only = frozenset([zone.zone])
-        zones = self._sweeper.sweep(q, forecast.displacement, only=only, placed=placed).zones
-        sharp = next(found for found in zones if found.zone == zone.zone)
-        return replace(sharp, closing=zone.closing or sharp.closing)
+        """A free zone whose alert is shown: a weak bound must not hold it.
+
+        Asks whether the way keeps clear of the deadband too, which is far quicker to tell than
+        how near it comes.
+        """
+        zones = self._sweeper.sweep(
+            q,
+            forecast.displacement,
+            clearance=False,
+            wider_m=self._rules.alerts.deadband_m,
+            only=frozenset([zone.zone]),
+            placed=placed,
+        ).zones
+        wide = next(found for found in zones if found.zone == zone.zone)
+        closing = wide.closing or self._moving.restless(zone.zone, self._swept_s)
+        now = zone.clearance_now_m if wide.clearance_now_m is None else wide.clearance_now_m
+        zone = replace(zone, closing=closing, clearance_now_m=now)
+        if wide.certificate is Certificate.FREE:
+            zone = replace(zone, clearance_m=wide.clearance_m)
+        return zone
 
     def _moment(self, health: Health, now_s: float) -> Moment:
         newest = self._newest

@@ -65,6 +65,7 @@ class Sweep:
         *,
         clearance: bool = True,
         any_path: bool = False,
+        wider_m: float = 0.0,
         only: frozenset[str] | None = None,
         placed: Mapping[str, Placement | None] | None = None,
         worst: bool = False,
@@ -77,6 +78,8 @@ class Sweep:
             clearance: also find each free zone's least clearance on the way; else the bound that
                 certified it is given, which may be far less.
             any_path: also ask whether any monotone way to the end could touch.
+            wider_m: certificates are about margins of solid zones wider by so much [m];
+                clearances still count from the margins themselves.
             only: names of the zones that are asked about; None asks about all.
             placed: where the zones that move are; None for one that nobody knows.
             worst: only the worst of all solid zones is wanted: later contacts are not looked for.
@@ -105,15 +108,15 @@ class Sweep:
                 zones=tuple(self._unfit(i, start, displacement) for i in asked),
                 any_path=AnyPath.UNKNOWN if any_path else None,
             )
-        zones, lost = self._place(placed or {}, asked)
-        found = self._search(zones, start, displacement, end, clearance=clearance, worst=worst)
-        told = found.view(np.ndarray).tolist()
+        zones, lost = self._place(placed or {}, asked, wider_m)
+        groups = self._search(zones, start, displacement, end, clearance=clearance, worst=worst)
+        told = groups.view(np.ndarray).tolist()
         moving = bool(displacement.any())
         entries = []
         if worst:
             together, asked = self._together(asked, lost)
             if together:
-                entries.append(self._worst(told[0], end, moving=moving))
+                entries.append(_from_margin(self._worst(told[0], end, moving=moving), wider_m))
         for index in asked:
             zone = problem.zones[index]
             if isinstance(zone, ActuatorLimit):
@@ -121,7 +124,8 @@ class Sweep:
             elif index in lost:
                 entries.append(uncomputed(zone.name))
             else:
-                entries.append(self._entry(zone, told[self._group[index]], end, moving=moving))
+                found = told[self._group[index]]
+                entries.append(_from_margin(self._entry(zone, found, end, moving=moving), wider_m))
         result = SweepResult(zones=tuple(entries), queries=int(problem.scratch.spent[0]))
         if not any_path:
             return result
@@ -193,15 +197,16 @@ class Sweep:
         return int(moved.max(initial=0.0) < AGAIN_M)
 
     def _place(
-        self, placed: Mapping[str, Placement | None], asked: list[int]
+        self, placed: Mapping[str, Placement | None], asked: list[int], wider_m: float
     ) -> tuple[Records, set[int]]:
         """The zones as they are now, and those of which nobody knows where they are."""
         problem = self.problem
         lost = {i for i in self._keyed if placed.get(problem.zones[i].name) is None}
         lost.intersection_update(asked)
-        if not placed and not lost and asked is self._every:
+        if not placed and not lost and asked is self._every and wider_m == 0.0:
             return problem.fixed, lost
         zones = problem.fixed.copy()
+        zones.margin += wider_m
         wanted = set(asked) - lost
         for number, index in enumerate(problem.solid):
             zones.active[number] = index in wanted
@@ -259,6 +264,18 @@ class Sweep:
             margin_m=zone.margin_m,
             confirmed_fraction=_confirmed(stop, confirmed),
         )
+
+
+def _from_margin(entry: ZoneSweep, wider_m: float) -> ZoneSweep:
+    """An entry about a wider margin, with clearances from the margin itself."""
+    if wider_m == 0.0:
+        return entry
+    least, now = entry.clearance_m, entry.clearance_now_m
+    return replace(
+        entry,
+        clearance_m=None if least is None else least + wider_m,
+        clearance_now_m=None if now is None else now + wider_m,
+    )
 
 
 def _confirmed(stop: float, confirmed: float) -> float | None:

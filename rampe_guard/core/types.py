@@ -248,6 +248,7 @@ class PathSweeper(Protocol):
         *,
         any_path: bool = False,
         clearance: bool = True,
+        wider_m: float = 0.0,
         only: frozenset[str] | None = None,
         placed: Mapping[str, Placement | None] | None = None,
     ) -> SweepResult:
@@ -255,6 +256,8 @@ class PathSweeper(Protocol):
 
         Without ``clearance``, clearances are proven but need not be sharp. With ``only``, the
         answer is about the zones of these names and no others. ``placed`` says where the keyed
-        objects stand; one that is None or not in it could be anywhere, and is unknown.
+        objects stand; one that is None or not in it could be anywhere, and is unknown. With
+        ``wider_m``, certificates are about margins of solid zones wider by so much [m], while
+        clearances still count from the margins themselves.
         """
         ...

@@ -50,6 +50,7 @@ class TimedSweeper:
         *,
         any_path: bool = False,
         clearance: bool = True,
+        wider_m: float = 0.0,
         only: frozenset[str] | None = None,
         placed: Mapping[str, Placement | None] | None = None,
     ) -> SweepResult:
@@ -59,6 +60,7 @@ class TimedSweeper:
             displacement,
             any_path=any_path,
             clearance=clearance,
+            wider_m=wider_m,
             only=only,
             placed=placed,
         )

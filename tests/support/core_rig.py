@@ -42,6 +42,7 @@ class Wall:
         *,
         any_path: bool = False,
         clearance: bool = True,
+        wider_m: float = 0.0,
         only: frozenset[str] | None = None,
         placed: Mapping[str, Placement | None] | None = None,
     ) -> SweepResult:
@@ -53,7 +54,8 @@ class Wall:
             return SweepResult(())
         edge = self.at - 0.1
         now, way = edge - float(start[0]), float(displacement[0])
-        fraction = 0.0 if now <= 0 else now / way if way >= now > 0 else None
+        left = now - wider_m
+        fraction = 0.0 if left <= 0 else left / way if way >= left > 0 else None
         kind = Certificate.FREE if fraction is None else Certificate.CONTACT
         near = max(now - max(way, 0.0), 0.0)
         zone = ZoneSweep("wall", kind, fraction, "arm", None, near, now, way > 0, 0.1)

@@ -45,11 +45,12 @@ class Jittery:
         *,
         any_path: bool = False,
         clearance: bool = True,
+        wider_m: float = 0.0,
         only: frozenset[str] | None = None,
         placed: Mapping[str, Placement | None] | None = None,
     ) -> SweepResult:
         """Inside about half of the time, and closing in."""
-        del start, displacement, any_path, clearance, placed
+        del start, displacement, any_path, clearance, wider_m, placed
         if only is not None and "wall" not in only:
             return SweepResult(())
         now = float(self._rng.normal(0.0, 0.02))

@@ -37,10 +37,11 @@ class Nowhere:
         *,
         any_path: bool = False,
         clearance: bool = True,
+        wider_m: float = 0.0,
         only: frozenset[str] | None = None,
         placed: Mapping[str, Placement | None] | None = None,
     ) -> SweepResult:
-        del start, displacement, any_path, clearance, only, placed
+        del start, displacement, any_path, clearance, wider_m, only, placed
         return SweepResult(())
 
 

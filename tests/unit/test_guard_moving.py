@@ -44,6 +44,7 @@ class Slide:
         *,
         any_path: bool = False,
         clearance: bool = True,
+        wider_m: float = 0.0,
         only: frozenset[str] | None = None,
         placed: Mapping[str, Placement | None] | None = None,
     ) -> SweepResult:
@@ -61,7 +62,8 @@ class Slide:
             return SweepResult((lost,))
         edge = float(where.pose[0, 3]) - RADIUS - where.grown_m - MARGIN
         now, way = edge - float(start[0]), float(displacement[0])
-        fraction = 0.0 if now <= 0 else now / way if way >= now > 0 else None
+        left = now - wider_m
+        fraction = 0.0 if left <= 0 else left / way if way >= left > 0 else None
         kind = Certificate.FREE if fraction is None else Certificate.CONTACT
         near = max(now - max(way, 0.0), 0.0)
         zone = ZoneSweep("truck", kind, fraction, "arm", None, near, now, way > 0, MARGIN)

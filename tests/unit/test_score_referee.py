@@ -24,10 +24,11 @@ class WallAtOne:
         *,
         any_path: bool = False,
         clearance: bool = True,
+        wider_m: float = 0.0,
         only: frozenset[str] | None = None,
         placed: Mapping[str, Placement | None] | None = None,
     ) -> SweepResult:
-        del any_path, clearance, only, placed
+        del any_path, clearance, wider_m, only, placed
         a, b = float(start[0]), float(start[0] + displacement[0])
         kind, fraction = Certificate.FREE, None
         if max(a, b) >= 5.0:

@@ -56,6 +56,24 @@ def test_without_clearance_the_certificates_are_the_same(tmp_path: Path) -> None
                 assert b.clearance_m <= a.clearance_m + SweepConfig().clearance_tolerance_m
 
 
+def test_wider_margins_are_those_of_a_scene_with_wider_margins(tmp_path: Path) -> None:
+    wide = replace(WALL, margin_m=WALL.margin_m + 0.3)
+    arm = load_arm(slider(tmp_path))
+    sweeper, other = FclSweeper(arm, Scene((WALL,))), FclSweeper(arm, Scene((wide,)))
+    seen = set()
+    for start, way in ((-1.0, 2.5), (-1.0, 3.0), (1.0, 0.5), (2.0, -1.0), (2.3, -1.0), (-1.0, 4.0)):
+        motion = np.array([start]), np.array([way])
+        for sharp in (True, False):
+            (a,) = sweeper.sweep(*motion, clearance=sharp, wider_m=0.3).zones
+            (b,) = other.sweep(*motion, clearance=sharp).zones
+            seen.add(a.certificate)
+            assert (a.certificate, a.contact_fraction) == (b.certificate, b.contact_fraction)
+            assert a.closing is b.closing
+            assert a.margin_m == WALL.margin_m
+            assert a.clearance_now_m == pytest.approx((b.clearance_now_m or 0.0) + 0.3)
+    assert seen == {Certificate.FREE, Certificate.CONTACT}
+
+
 def _timeless(result: SweepResult) -> SweepResult:
     return replace(result, elapsed_ms=None)
 
