@@ -189,7 +189,7 @@ class Keeper:
             file.release()
 
     def _save(self, saver: Saver) -> None:
-        if self._learner is not None and (counts := dict(self._learner.categories)) != saver.saved:
+        if self._learner is not None and (counts := dict(self._learner.categories)) != saver.taken:
             header = counted(self._header, self._learner)
             # copies: the learner goes on while they are written
             arrays = {name: a.copy() for name, a in self._learner.snapshot().items()}

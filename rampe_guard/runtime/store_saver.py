@@ -28,12 +28,13 @@ class Saver:
     """Writes the newest `Save` that it was given; two never at once, older ones never after.
 
     Attributes:
-        saved: occurrences by category in the file as it is now.
+        taken: occurrences by category in the file as it is, or will be once what was given is
+            written.
         problem: why the last save failed; None if it did not.
     """
 
     def __init__(self, file: ModelFile, saved: Mapping[Category, int]) -> None:
-        self.saved = saved
+        self.taken = self._saved = saved
         self.problem: str | None = None
         self._file = file
         self._next: Save | None = None
@@ -47,6 +48,7 @@ class Saver:
         """Have it written as soon as the disk is free, instead of one that still waits."""
         with self._changed:
             self._next = save
+            self.taken = save.counts
             self._changed.notify()
 
     def finish(self, within_s: float) -> bool:
@@ -63,8 +65,9 @@ class Saver:
                 self._file.write(encode(save.header, save.arrays))
             except (ModelFileError, ValueError, MemoryError) as error:
                 self.problem = str(error) or type(error).__name__
+                self.taken = self._saved  # to be given again
             else:
-                self.saved = save.counts
+                self._saved = save.counts
                 self.problem = None
 
     def _wait(self) -> Save | None:
