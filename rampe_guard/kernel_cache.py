@@ -7,8 +7,11 @@ compiled anew.
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 COMPILED = "search_kernel.search-*.nbi"
@@ -43,7 +46,33 @@ def choose_folder() -> None:
 
 
 def kept() -> bool:
-    """Whether there are compiled kernels; else the first sweep takes a minute."""
-    chosen = os.environ.get("NUMBA_CACHE_DIR")
-    folder = Path(chosen) if chosen else Path(__file__).parent / "core" / "__pycache__"
-    return any(folder.rglob(COMPILED))
+    """Whether this very package has compiled kernels; else the first sweep takes a minute."""
+    folder = _folder()
+    return folder is not None and any(folder.glob(COMPILED))
+
+
+@contextmanager
+def one_at_a_time() -> Iterator[None]:
+    """Compile in here: who comes second waits for the first, and then finds it done."""
+    folder = _folder()
+    if folder is None or kept():
+        yield
+        return
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = (folder / "lock").open("w")
+    except OSError:  # then each compiles for itself
+        yield
+        return
+    with lock:  # closing it lets go
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+def _folder() -> Path | None:
+    """Where numba keeps the outermost kernel; None if it keeps nothing."""
+    # not before the folder is chosen
+    from rampe_guard.core.search_kernel import search  # noqa: PLC0415
+
+    path = getattr(getattr(search, "stats", None), "cache_path", None)
+    return None if path is None else Path(path)

@@ -91,7 +91,7 @@ class MachineState:
         if self.heartbeat is None:
             return ("no guard was heard",)
         if self.gone:
-            return ("the guard is gone",)
+            return ("the guard, or the network to it, is gone",)
         if self.silent:
             return (f"no heartbeat for {self.silence_s:.1f} s",)
         if self.protection is Protection.UNAVAILABLE:

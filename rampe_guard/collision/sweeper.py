@@ -20,6 +20,7 @@ from rampe_guard.core.sweep import Sweep
 from rampe_guard.core.sweep_problem import SelfZone, SweepProblem, Zone
 from rampe_guard.core.types import Certificate
 from rampe_guard.errors import GeometryError
+from rampe_guard.kernel_cache import one_at_a_time
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -171,8 +172,9 @@ class FclSweeper:
     def _warm_up(self) -> None:
         """Sweep once, so that nothing is compiled or loaded any more when it counts."""
         ends = np.where(np.isfinite(self.arm.limits), self.arm.limits, 0.0)
-        for worst in (False, True):
-            self.sweep(ends.mean(axis=1), np.zeros(len(ends)), any_path=not worst, worst=worst)
+        with one_at_a_time():
+            for worst in (False, True):
+                self.sweep(ends.mean(axis=1), np.zeros(len(ends)), any_path=not worst, worst=worst)
 
     def link_poses(self, actuators: FloatArray) -> FloatArray:
         """World poses (k, L, 4, 4) of all links for actuator values (k, n)."""

@@ -47,7 +47,11 @@ class LevelRules:
         probability = forecast.probability_at(fraction)
         time_s = forecast.time_at(fraction)
         if sweep.inside and not sweep.closing:
-            return Evidence(Level.CLEAR, _source(forecast, sweep), 0.0, None, sweep)
+            # who stands in an object is not clear of it; who leaves it is not alarmed anew
+            standing = not forecast.displacement.any()
+            held = sweep.touching and (bool(shown) or standing)
+            level = Level.CAUTION if held else Level.CLEAR
+            return Evidence(level, _source(forecast, sweep), 0.0, None, sweep)
         if isinstance(forecast, StoppingForecast):
             return Evidence(Level.IMMINENT, _source(forecast, sweep), 1.0, time_s, sweep)
         level = self._intent_level(probability, time_s, shown, stop_s)

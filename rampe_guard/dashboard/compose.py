@@ -188,7 +188,10 @@ def _contact(alerts: Iterable[Alert], now_s: float) -> Contact | None:
 
 def _card(sight: Sight, alert: Alert, *, lost: bool) -> Card:
     stale = lost or sight.guard.expired(alert) or alert.quality == "stale"
-    remarks = [f"last known, {sight.now_s - alert.received_s:.0f} s ago"] if stale else []
+    # a frozen alert is repeated: what it tells of is as old as the guard's newest input
+    before_s = (alert.input_age_s or 0.0) if alert.quality == "stale" else 0.0
+    age_s = sight.now_s - alert.received_s + before_s
+    remarks = [f"last known, {age_s:.0f} s ago"] if stale else []
     if alert.state == "rtn_unacked":
         remarks.append("over: please acknowledge")
     elif alert.state == "acked":

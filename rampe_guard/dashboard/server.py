@@ -93,6 +93,8 @@ class Dashboard:
         warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
         self._lock = threading.Lock()
         self._pages: dict[int, Page] = {}
+        # a health check, or whatever else speaks no websocket, is no fault of ours
+        logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
         self._server = _Server(host=host, port=_free(host, port), verbose=False)
         self._server.on_client_connect(self._come)
         self._server.on_client_disconnect(self._go)

@@ -35,7 +35,9 @@ def watch_wall(
     """
     news = _News()
     if not console.is_terminal:
+        troubles = _Troubles()
         while not stop.wait(_LINE_S):
+            troubles.say(links)
             for event in reversed(wall.hear(news.of(links), time.monotonic()).events):
                 line = f"{event.level.word:9} {event.text}"
                 console.print(line, markup=False, highlight=False, soft_wrap=True)
@@ -60,11 +62,27 @@ def watch_wall(
 
 def watch_json(links: Sequence[Link], stop: StopFlag) -> None:
     """Print every transition, change of protection and loss as one JSON object a line."""
-    news = _News()
+    news, troubles = _News(), _Troubles()
     while not stop.wait(_LINE_S):
+        troubles.say(links)
         for item in news.of(links):
             sys.stdout.buffer.write(json_line(item, time.time()) + b"\n")
         sys.stdout.buffer.flush()
+
+
+class _Troubles:
+    """Says on stderr why nothing can be heard, once for each reason: a pipe has no banner."""
+
+    def __init__(self) -> None:
+        self._said: dict[int, str | None] = {}
+
+    def say(self, links: Sequence[Link]) -> None:
+        for number, link in enumerate(links):
+            problem = link.problem
+            if problem != self._said.get(number):
+                self._said[number] = problem
+                sys.stderr.write(f"rampe-guard: {problem or 'the Zenoh router is there again'}\n")
+                sys.stderr.flush()
 
 
 class _News:

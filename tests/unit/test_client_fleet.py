@@ -147,7 +147,7 @@ def test_a_silent_guard_is_told_once_and_so_is_its_return(ear: Listener) -> None
 def test_a_token_that_went_is_told_at_once_until_a_heartbeat_comes(ear: Listener) -> None:
     ear.token(alive=False)
     (lost,) = ear.told()
-    assert lost.text == "PROTECTION UNAVAILABLE: the guard is gone"
+    assert lost.text == "PROTECTION UNAVAILABLE: the guard, or the network to it, is gone"
     ear.beat(2)
     assert kinds(ear.told()) == ["ProtectionBack"]
 

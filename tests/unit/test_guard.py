@@ -54,13 +54,38 @@ def test_an_operator_who_stops_short_is_left_in_peace() -> None:
 def test_backing_out_is_never_alarmed_and_ends_the_alert() -> None:
     rig = Rig()
     rig.hold(0.0, 0.5)
-    rig.hold(0.8, 1.4)  # into the margin
+    rig.hold(0.8, 1.3)  # into the margin
     assert rig.alerts()[-1].level is Level.IMMINENT
     rig.hold(0.0, 1.5)
     assert rig.alerts()[-1].level is Level.CLEAR
     rig.events.clear()
     rig.hold(-0.8, 1.0)
     assert rig.alerts() == []
+
+
+def test_who_stands_in_an_object_is_not_clear_of_it_until_he_has_left() -> None:
+    rig = Rig()
+    rig.hold(0.0, 0.5)
+    rig.hold(0.8, 1.5)  # into the wall itself
+    assert rig.alerts()[-1].level is Level.IMMINENT
+    rig.hold(0.0, 3.0)
+    told = rig.alerts()[-1]
+    assert (told.level, told.state) == (Level.CAUTION, State.UNACKED)
+    assert (told.evidence.source, told.link) == ("contact", "arm")
+    rig.events.clear()
+    rig.hold(-0.2, 0.4)  # on the way out, still in it
+    assert rig.alerts() == []
+    rig.hold(-0.8, 1.5)
+    told = rig.alerts()[-1]
+    assert (told.level, told.state) == (Level.CLEAR, State.RTN_UNACKED)
+    assert all(e.level is not Level.IMMINENT for e in rig.alerts())
+
+
+def test_a_guard_that_starts_inside_an_object_says_so() -> None:
+    rig = Rig()
+    rig.q = 1.3
+    rig.hold(0.0, 1.0)
+    assert [(e.level, e.evidence.source) for e in rig.alerts()] == [(Level.CAUTION, "contact")]
 
 
 def test_primitives_are_learned_and_told() -> None:

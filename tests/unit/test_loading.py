@@ -106,9 +106,15 @@ def test_compiling_is_said_where_no_kernels_are_kept(
         monkeypatch.setattr(kernel_cache, "kept", lambda kept=kept: kept)
         load_telling(load_site(site), said.append)
     assert said == [COMPILING]
-    monkeypatch.undo()
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "none"))
-    assert not kernel_cache.kept()
+    program = "from rampe_guard import kernel_cache; print(kernel_cache.kept())"
+    answer = subprocess.run(
+        [sys.executable, "-c", program],
+        env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "none")},
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    assert answer.stdout == "False\n"
 
 
 def test_after_a_sweep_there_are_kernels_and_processes_share_them(site: str) -> None:
