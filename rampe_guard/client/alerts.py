@@ -10,9 +10,8 @@ from typing import Self
 from rampe_guard.client.items import Alert, Item
 from rampe_guard.client.machine import MachineState
 from rampe_guard.client.stream import Stream
-from rampe_guard.settings import ZenohSettings
+from rampe_guard.settings import DEFAULT_ENDPOINT, ZenohSettings
 
-ROUTER = "tcp/127.0.0.1:7447"
 EVERYONE = "rampe/*/*/guard"
 
 
@@ -42,7 +41,7 @@ class Alerts:
 
     def __init__(
         self,
-        connect: str | Sequence[str] = ROUTER,
+        connect: str | Sequence[str] = DEFAULT_ENDPOINT,
         base: str | Sequence[str] = EVERYONE,
         *,
         config: str | Path | None = None,

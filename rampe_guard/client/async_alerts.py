@@ -9,10 +9,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from rampe_guard.client.alerts import EVERYONE, ROUTER, network, several
+from rampe_guard.client.alerts import EVERYONE, network, several
 from rampe_guard.client.items import Alert, Item
 from rampe_guard.client.machine import MachineState
 from rampe_guard.client.stream import Stream
+from rampe_guard.settings import DEFAULT_ENDPOINT
 
 
 class AsyncAlerts:
@@ -23,7 +24,7 @@ class AsyncAlerts:
 
     def __init__(
         self,
-        connect: str | Sequence[str] = ROUTER,
+        connect: str | Sequence[str] = DEFAULT_ENDPOINT,
         base: str | Sequence[str] = EVERYONE,
         *,
         config: str | Path | None = None,

@@ -11,7 +11,7 @@ from rampe_guard.client import fleet as core
 from rampe_guard.client.fleet import Fleet, Told
 from rampe_guard.client.items import Alert, Item
 from rampe_guard.errors import MessageError
-from rampe_guard.runtime.zenoh_io import Bus, Inquiry, check_key_expression
+from rampe_guard.runtime.zenoh_io import Bus, Inquiry, check_key_expression, is_pattern
 
 _CAPACITY = 4096
 """Messages that may wait on one subscription."""
@@ -74,7 +74,7 @@ class Feed:
             time.sleep(_LOOK_S)
         items += self.poll()
         for base in self._bases:
-            if "*" not in base and "$" not in base:
+            if not is_pattern(base):
                 items += self._take(core.expect(self.fleet, base, time.monotonic()))
         return items
 

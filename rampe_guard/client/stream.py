@@ -11,6 +11,7 @@ from rampe_guard import wire
 from rampe_guard.client.feed import Feed
 from rampe_guard.client.items import Alert, Item, MessagesLost, alert_from
 from rampe_guard.client.machine import MachineState
+from rampe_guard.client.order import Order, give
 from rampe_guard.errors import ConnectionFailedError
 from rampe_guard.runtime.zenoh_io import Bus
 from rampe_guard.settings import ZenohSettings
@@ -128,7 +129,7 @@ class Stream:
         Raises:
             ConnectionFailedError: no guard answers, or it refuses, with its reason.
         """
-        return self._order(alert.base, "ack", wire.Ack(alert_id=alert.alert_id, who=who))
+        return self._order(alert.base, wire.Ack(alert_id=alert.alert_id, who=who))
 
     def shelve(self, alert: Alert, who: str, duration_s: float) -> Alert:
         """Keep an alert silent for a while [s]; 0 ends that; the alert as it is then.
@@ -137,15 +138,13 @@ class Stream:
             ConnectionFailedError: no guard answers, or it refuses, with its reason.
         """
         wish = wire.Shelve(alert_id=alert.alert_id, who=who, duration_s=duration_s)
-        return self._order(alert.base, "shelve", wish)
+        return self._order(alert.base, wish)
 
-    def _order(self, base: str, verb: str, order: wire.Ack | wire.Shelve) -> Alert:
+    def _order(self, base: str, order: Order) -> Alert:
         if self._bus is None:
-            raise ConnectionFailedError(f"{base}/{verb}: the client is closed")
-        answers = self._bus.ask(f"{base}/{verb}", wire.encode(order), self._timeout_s)
-        if not answers:
-            raise ConnectionFailedError(f"no guard answers on {base}/{verb}")
-        return alert_from(wire.decode(answers[0], wire.Alert), base, time.monotonic())
+            raise ConnectionFailedError(f"{base}: the client is closed")
+        answer = give(self._bus, base, order, self._timeout_s)
+        return alert_from(wire.decode(answer, wire.Alert), base, time.monotonic())
 
     def _follow(self) -> None:
         try:

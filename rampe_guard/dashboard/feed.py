@@ -11,27 +11,24 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from rampe_guard import wire
 from rampe_guard.client import fleet as fleets
 from rampe_guard.client.fleet import Fleet, Told
 from rampe_guard.client.items import Item
-from rampe_guard.core.types import ActuatorSample, FloatArray
+from rampe_guard.client.order import Order, give
+from rampe_guard.core.types import ActuatorSample
 from rampe_guard.core.velocity import VelocityEstimator
 from rampe_guard.dashboard.happenings import Leads, with_items
 from rampe_guard.dashboard.sight import Sight
 from rampe_guard.errors import ConnectionFailedError, MessageError
+from rampe_guard.runtime.intake import pose_of
 from rampe_guard.runtime.stopping import StopFlag
 from rampe_guard.runtime.zenoh_io import Bus, Inbox, Liveness
 from rampe_guard.settings import Site
-
-T = TypeVar("T")
 
 _CAPACITY = 1024
 """Of an inbox: several seconds of a fast machine."""
@@ -113,7 +110,7 @@ class Feed:
         Raises:
             ConnectionFailedError: nobody answers, or the guard refuses.
         """
-        self._ask("ack", wire.encode(wire.Ack(alert_id=alert_id, who=who)))
+        self._order(wire.Ack(alert_id=alert_id, who=who))
 
     def shelve(self, alert_id: str, who: str, duration_s: float) -> None:
         """Put an alert aside for a time [s]; 0 ends that.
@@ -121,8 +118,7 @@ class Feed:
         Raises:
             ConnectionFailedError: nobody answers, or the guard refuses.
         """
-        order = wire.Shelve(alert_id=alert_id, who=who, duration_s=duration_s)
-        self._ask("shelve", wire.encode(order))
+        self._order(wire.Shelve(alert_id=alert_id, who=who, duration_s=duration_s))
 
     def close(self) -> None:
         """End the thread (``stop`` is set by now) and the session."""
@@ -130,12 +126,10 @@ class Feed:
         if self._line is not None:
             self._line.bus.close()
 
-    def _ask(self, what: str, payload: bytes) -> None:
-        line = self._line
-        if line is None:
+    def _order(self, order: Order) -> None:
+        if self._line is None:
             raise ConnectionFailedError(self._trouble)
-        if not line.bus.ask(f"{self._base}/{what}", payload):
-            raise ConnectionFailedError(f"no guard answers on {self._base}/{what}")
+        give(self._line.bus, self._base, order)
 
     # the thread
 
@@ -185,9 +179,9 @@ class Feed:
         while self._answers:
             asked_s, state = self._answers.popleft()
             items += self._tell(fleets.on_state(self._fleet, self._base, state, now_s, asked_s))
-        for beat in _read(line.beats, lambda p: wire.decode(p, wire.Heartbeat)):
+        for beat in line.beats.read(lambda p: wire.decode(p, wire.Heartbeat)):
             items += self._tell(fleets.on_heartbeat(self._fleet, self._base, beat, now_s))
-        for alert in _read(line.alerts, lambda p: wire.decode(p, wire.Alert)):
+        for alert in line.alerts.read(lambda p: wire.decode(p, wire.Alert)):
             self._leads = self._leads.take(alert)
             items += self._tell(fleets.on_alert(self._fleet, self._base, alert, now_s))
         alive = line.token.poll()
@@ -203,7 +197,7 @@ class Feed:
         return items
 
     def _take_predictions(self, line: _Line, sight: Sight) -> Sight:
-        for message in _read(line.predictions, lambda p: wire.decode(p, wire.Prediction)):
+        for message in line.predictions.read(lambda p: wire.decode(p, wire.Prediction)):
             under_way = message.event != "ended" and message.mean is not None
             sight = replace(sight, prediction=message if under_way else None)
         return sight
@@ -211,11 +205,11 @@ class Feed:
     def _take_inputs(self, line: _Line, sight: Sight) -> Sight:
         site, now_s = self._site, sight.now_s
         names, axes = site.actuator_names, site.guard.axes
-        levers = _read(line.joystick, lambda p: wire.decode_joystick(p, axes))
+        levers = line.joystick.read(lambda p: wire.decode_joystick(p, axes))
         if levers:
             command = [a.sign * levers[-1].axes[a.axis] for a in site.guard.actuators]
             sight = replace(sight, command=np.array(command), command_s=now_s)
-        for moved in _read(line.actuators, lambda p: wire.decode_actuators(p, names)):
+        for moved in line.actuators.read(lambda p: wire.decode_actuators(p, names)):
             position = np.array(moved.position)
             measured = None if moved.velocity is None else np.array(moved.velocity)
             stamp_s = now_s if moved.stamp is None else moved.stamp
@@ -223,29 +217,8 @@ class Feed:
             sight = replace(sight, position=position, position_s=now_s)
         placed, placed_s = dict(sight.placed), dict(sight.placed_s)
         for name, inbox in line.objects:
-            poses = _read(inbox, wire.decode_object_pose)
+            poses = inbox.read(wire.decode_object_pose)
             if poses:
-                placed[name], placed_s[name] = _matrix(poses[-1]), now_s
+                placed[name], placed_s[name] = pose_of(poses[-1]), now_s
         velocity = self._speed.velocity
         return replace(sight, velocity=velocity, placed=placed, placed_s=placed_s)
-
-
-def _read(inbox: Inbox, decoder: Callable[[bytes], T]) -> list[T]:
-    """What can be read; a viewer has nothing to say about the rest, the guard does."""
-    found = []
-    for message in inbox.drain():
-        try:
-            found.append(decoder(message.payload))
-        except MessageError:
-            continue
-    return found
-
-
-def _matrix(pose: wire.ObjectPose) -> FloatArray:
-    matrix = np.eye(4)
-    if pose.quaternion_xyzw is not None:
-        matrix[:3, :3] = Rotation.from_quat(pose.quaternion_xyzw).as_matrix()
-    elif pose.rpy_rad is not None:
-        matrix[:3, :3] = Rotation.from_euler("xyz", pose.rpy_rad).as_matrix()
-    matrix[:3, 3] = pose.xyz_m
-    return matrix

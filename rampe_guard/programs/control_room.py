@@ -10,12 +10,10 @@ from rich.console import Console
 from rampe_guard.errors import SettingsError
 from rampe_guard.runtime.connecting import connect_to
 from rampe_guard.runtime.stopping import StopFlag
-from rampe_guard.settings import Site, ZenohSettings, load_site
+from rampe_guard.settings import DEFAULT_ENDPOINT, Site, ZenohSettings, load_site
 from rampe_guard.view.links import Link
 from rampe_guard.view.wall import Wall
 from rampe_guard.view.wall_watch import watch_json, watch_wall
-
-ROUTER = "tcp/127.0.0.1:7447"
 
 
 def watch_many(
@@ -66,7 +64,7 @@ def _links(sites: Sequence[Site], bases: Sequence[str], endpoints: Sequence[str]
     if bases:
         # beside site files their own network is meant
         known = list(ways) if not endpoints else []
-        free = known or [ZenohSettings(None, "client", tuple(endpoints) or (ROUTER,))]
+        free = known or [ZenohSettings(None, "client", tuple(endpoints) or (DEFAULT_ENDPOINT,))]
         for way in free:
             ways.setdefault(way, []).extend(bases)
     return [Link(way, list(dict.fromkeys(wanted))) for way, wanted in ways.items()]

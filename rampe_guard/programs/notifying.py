@@ -29,8 +29,8 @@ from rampe_guard.notify.tones import UNPROTECTED
 from rampe_guard.runtime.connecting import connect_to
 from rampe_guard.runtime.say import Sayer, configure
 from rampe_guard.runtime.stopping import StopFlag
-from rampe_guard.runtime.zenoh_io import Bus
-from rampe_guard.settings import ZenohSettings, load_site
+from rampe_guard.runtime.zenoh_io import Bus, is_pattern
+from rampe_guard.settings import DEFAULT_ENDPOINT, ZenohSettings, load_site
 
 _WAKE_S = 0.01
 _GRACE_S = 2.0
@@ -157,7 +157,7 @@ class Desk:
     def _router_back(self, bases: Sequence[str]) -> None:
         """There is a router; of machines known by name the feed says the rest."""
         for base in bases:
-            if "*" in base:
+            if is_pattern(base):
                 notice = notice_of(_back(base), self._at_least)
                 if notice is not None:
                     self._offer(notice)
@@ -167,7 +167,7 @@ def _whom(wishes: Wishes) -> tuple[ZenohSettings, tuple[str, ...]]:
     if wishes.site is None:
         if not wishes.bases:
             raise SettingsError("nobody to follow: give a SITE or --base")
-        endpoints = tuple(wishes.connect) or ("tcp/127.0.0.1:7447",)
+        endpoints = tuple(wishes.connect) or (DEFAULT_ENDPOINT,)
         return ZenohSettings(None, "client", endpoints), tuple(wishes.bases)
     site = connect_to(load_site(wishes.site), wishes.connect)
     return site.zenoh, (site.keys.base, *wishes.bases)

@@ -6,7 +6,7 @@ import getpass
 from collections.abc import Sequence
 
 from rampe_guard import wire
-from rampe_guard.errors import ConnectionFailedError
+from rampe_guard.client.order import Order, give
 from rampe_guard.runtime.connecting import connect_to
 from rampe_guard.runtime.zenoh_io import Bus
 from rampe_guard.settings import load_site
@@ -18,12 +18,7 @@ def acknowledge(site_path: str, endpoints: Sequence[str], alert_id: str, who: st
     Raises:
         ConnectionFailedError: no router, no guard, or the guard refuses (with its reason).
     """
-    site = connect_to(load_site(site_path), endpoints)
-    with Bus.open(site.zenoh) as bus:
-        ack = wire.Ack(alert_id=alert_id, who=who or getpass.getuser())
-        if not bus.ask(f"{site.keys.base}/ack", wire.encode(ack)):
-            raise ConnectionFailedError(f"no guard answers on {site.keys.base}/ack")
-    return 0
+    return _ask(site_path, endpoints, wire.Ack(alert_id=alert_id, who=who or getpass.getuser()))
 
 
 def shelve(
@@ -34,9 +29,13 @@ def shelve(
     Raises:
         ConnectionFailedError: no router, no guard, or the guard refuses (with its reason).
     """
+    who = who or getpass.getuser()
+    wish = wire.Shelve(alert_id=alert_id, who=who, duration_s=duration_s)
+    return _ask(site_path, endpoints, wish)
+
+
+def _ask(site_path: str, endpoints: Sequence[str], order: Order) -> int:
     site = connect_to(load_site(site_path), endpoints)
     with Bus.open(site.zenoh) as bus:
-        wish = wire.Shelve(alert_id=alert_id, who=who or getpass.getuser(), duration_s=duration_s)
-        if not bus.ask(f"{site.keys.base}/shelve", wire.encode(wish)):
-            raise ConnectionFailedError(f"no guard answers on {site.keys.base}/shelve")
+        give(bus, site.keys.base, order)
     return 0

@@ -135,17 +135,19 @@ def _said(message: wire.EnabledMessage, now_s: float) -> EnabledSample:
 def _placed(name: str, message: wire.ObjectPose, now_s: float) -> ObjectSample:
     stamped = message.stamp is not None
     stamp_s = now_s if message.stamp is None else message.stamp
-    pose = np.eye(4)
-    pose[:3, :3] = _rotation(message)
-    pose[:3, 3] = message.xyz_m
-    return ObjectSample(name, pose, stamp_s, now_s, stamped=stamped)
+    return ObjectSample(name, pose_of(message), stamp_s, now_s, stamped=stamped)
 
 
-def _rotation(message: wire.ObjectPose) -> FloatArray:
-    """Rotation matrix (3, 3); ``rpy`` turns about the fixed axes, as in URDF."""
+def pose_of(message: wire.ObjectPose) -> FloatArray:
+    """Pose (4, 4) of a message; ``rpy`` turns about the fixed axes, as in URDF."""
     if message.quaternion_xyzw is not None:
-        return Rotation.from_quat(message.quaternion_xyzw).as_matrix()
-    return Rotation.from_euler("xyz", message.rpy_rad or (0.0, 0.0, 0.0)).as_matrix()
+        rotation = Rotation.from_quat(message.quaternion_xyzw)
+    else:
+        rotation = Rotation.from_euler("xyz", message.rpy_rad or (0.0, 0.0, 0.0))
+    pose = np.eye(4)
+    pose[:3, :3] = rotation.as_matrix()
+    pose[:3, 3] = message.xyz_m
+    return pose
 
 
 def _exact(message: Message, key: str) -> None:

@@ -13,12 +13,14 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, Literal, Self
+from typing import Any, Literal, Self, TypeVar
 
 import zenoh
 
-from rampe_guard.errors import ConnectionFailedError, SettingsError
+from rampe_guard.errors import ConnectionFailedError, MessageError, SettingsError
 from rampe_guard.settings import ZenohSettings
+
+T = TypeVar("T")
 
 _TRY_MS = 1000
 """One attempt to connect; longer ones cannot be interrupted by a signal."""
@@ -57,6 +59,14 @@ class Inbox:
         if len(messages) == self._capacity:
             self.overruns += 1  # a full ring has most likely dropped some
         return messages
+
+    def read(self, decoder: Callable[[bytes], T]) -> list[T]:
+        """What waits and can be read, for viewers: what cannot, the guard tells of."""
+        found = []
+        for message in self.drain():
+            with contextlib.suppress(MessageError):
+                found.append(decoder(message.payload))
+        return found
 
 
 class Liveness:
@@ -332,6 +342,11 @@ def check_configuration(settings: ZenohSettings) -> None:
         SettingsError: it could not.
     """
     _config(settings)
+
+
+def is_pattern(key: str) -> bool:
+    """Whether a key expression may stand for several keys (``*``, ``**``, ``$*``)."""
+    return "*" in key
 
 
 def check_key_expression(text: str) -> None:

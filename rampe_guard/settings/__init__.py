@@ -17,8 +17,10 @@ from rampe_guard.settings.site import (
     for_operator,
     load_site,
 )
+from rampe_guard.settings.site_model import DEFAULT_ENDPOINT
 
 __all__ = [
+    "DEFAULT_ENDPOINT",
     "ColumnMap",
     "Keys",
     "LogMapping",

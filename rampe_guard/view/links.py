@@ -19,7 +19,7 @@ from rampe_guard.client.fleet import Fleet
 from rampe_guard.client.items import Item
 from rampe_guard.client.machine import MachineState
 from rampe_guard.errors import ConnectionFailedError
-from rampe_guard.runtime.zenoh_io import Bus, check_configuration, check_key_expression
+from rampe_guard.runtime.zenoh_io import Bus, check_configuration, check_key_expression, is_pattern
 from rampe_guard.settings import ZenohSettings
 
 _POLL_S = 0.02
@@ -76,7 +76,7 @@ class Link:
     def _expect(self) -> None:
         """Machines that are named should be there: until they are heard, nobody is protected."""
         for base in self._bases:
-            if "*" not in base and "$" not in base:
+            if not is_pattern(base):
                 self._fleet, items = core.expect(self._fleet, base, time.monotonic())
                 self._missing.extend(items)
 

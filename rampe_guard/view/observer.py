@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from typing import TypeAlias
 
 import msgspec
 
 from rampe_guard import wire
 from rampe_guard.core.types import FloatArray
-from rampe_guard.errors import ConnectionFailedError, MessageError
-from rampe_guard.runtime.zenoh_io import Bus, Inbox
+from rampe_guard.errors import ConnectionFailedError
+from rampe_guard.runtime.zenoh_io import Bus
 from rampe_guard.settings import Site
 from rampe_guard.view import follow
 from rampe_guard.view.state import ViewState
@@ -54,11 +53,11 @@ class Observer:
         now_s = time.monotonic()
         names, axes = self._site.actuator_names, self._site.guard.axes
         heard: list[Heard] = []
-        heard += _decode(self._joystick, lambda p: wire.decode_joystick(p, axes))
-        heard += _decode(self._actuators, lambda p: wire.decode_actuators(p, names))
-        heard += _decode(self._beats, lambda p: wire.decode(p, wire.Heartbeat))
-        heard += _decode(self._predictions, lambda p: wire.decode(p, wire.Prediction))
-        heard += _decode(self._alerts, lambda p: wire.decode(p, wire.Alert))
+        heard += self._joystick.read(lambda p: wire.decode_joystick(p, axes))
+        heard += self._actuators.read(lambda p: wire.decode_actuators(p, names))
+        heard += self._beats.read(lambda p: wire.decode(p, wire.Heartbeat))
+        heard += self._predictions.read(lambda p: wire.decode(p, wire.Prediction))
+        heard += self._alerts.read(lambda p: wire.decode(p, wire.Alert))
         state = follow.at(self.state, now_s)
         for message in heard:
             state = _show(state, message, now_s)
@@ -73,17 +72,6 @@ class Observer:
         for answer in answers:
             state = wire.decode(answer, wire.State)
             self.state = follow.on_state(self.state, state, time.monotonic())
-
-
-def _decode(inbox: Inbox, decoder: Callable[[bytes], Heard]) -> list[Heard]:
-    """What can be read; a viewer has nothing to say about the rest, the guard does."""
-    heard = []
-    for message in inbox.drain():
-        try:
-            heard.append(decoder(message.payload))
-        except MessageError:
-            continue
-    return heard
 
 
 def _show(state: ViewState, message: msgspec.Struct, now_s: float) -> ViewState:

@@ -1,0 +1,24 @@
+"""What people ask of a guard about one alert."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+from rampe_guard import wire
+from rampe_guard.errors import ConnectionFailedError
+from rampe_guard.runtime.zenoh_io import Bus
+
+Order: TypeAlias = wire.Ack | wire.Shelve
+
+
+def give(bus: Bus, base: str, order: Order, timeout_s: float = 2.0) -> bytes:
+    """Ask it of the guard at ``base``; returns the alert as it is then, as it came.
+
+    Raises:
+        ConnectionFailedError: no guard answers, or it refuses, with its reason.
+    """
+    key = f"{base}/{'ack' if isinstance(order, wire.Ack) else 'shelve'}"
+    answers = bus.ask(key, wire.encode(order), timeout_s)
+    if not answers:
+        raise ConnectionFailedError(f"no guard answers on {key}")
+    return answers[0]
