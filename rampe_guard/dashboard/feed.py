@@ -25,7 +25,7 @@ from rampe_guard.core.velocity import VelocityEstimator
 from rampe_guard.dashboard.happenings import Leads, with_items
 from rampe_guard.dashboard.sight import Sight
 from rampe_guard.errors import ConnectionFailedError, MessageError
-from rampe_guard.runtime.intake import pose_of
+from rampe_guard.runtime.batch import pose_of
 from rampe_guard.runtime.stopping import StopFlag
 from rampe_guard.runtime.zenoh_io import Bus, Inbox, Liveness
 from rampe_guard.settings import Site

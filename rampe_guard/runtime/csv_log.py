@@ -16,8 +16,9 @@ from pathlib import Path
 import numpy as np
 
 from rampe_guard.core.inputs import AXIS_SLACK
-from rampe_guard.core.types import ActuatorSample, FloatArray, JoystickSample
+from rampe_guard.core.types import ActuatorSample, FloatArray, Inputs, JoystickSample
 from rampe_guard.errors import LogError
+from rampe_guard.runtime.replay import idle_times
 from rampe_guard.settings import ColumnMap, Site
 
 _WRONG_SHARE = 0.02
@@ -50,6 +51,35 @@ class CsvLog:
         """One pair of samples a row; they arrive when they were stamped."""
         for t, u, q in zip(self.time_s.tolist(), self.axes, self.position, strict=True):
             yield JoystickSample(t, u, t), ActuatorSample(t, q, None, t)
+
+    @property
+    def first_s(self) -> float:
+        """Time of the first row [s]."""
+        return float(self.time_s[0])
+
+    @property
+    def epoch_s(self) -> float:
+        """What is added to a time of the log to give what messages say [s]: nothing."""
+        return 0.0
+
+    @property
+    def objects(self) -> frozenset[str]:
+        """Names of the objects whose poses are in it: a CSV log has none."""
+        return frozenset()
+
+    def steps(self) -> Iterator[tuple[float, Inputs]]:
+        """Time [s] of every step of a guard and what arrived: a row, or nothing in a gap."""
+        last_s: float | None = None
+        for joystick, actuators in self.samples():
+            now_s = joystick.arrival_s
+            if last_s is not None:
+                yield from ((idle_s, Inputs()) for idle_s in idle_times(last_s, now_s))
+            last_s = now_s
+            yield now_s, Inputs((joystick,), (actuators,))
+
+    def positions(self) -> Iterator[tuple[float, FloatArray]]:
+        """Where the arm was: time [s] and position (n,) of every row."""
+        yield from zip(self.time_s.tolist(), self.position, strict=True)
 
 
 def read_csv_log(site: Site, path: str | Path, limits: FloatArray) -> CsvLog:

@@ -28,6 +28,7 @@ from rampe_guard.wire.inputs import (
     decode_object_pose,
 )
 from rampe_guard.wire.prediction import Endpoint, Prediction, PredictionSweep
+from rampe_guard.wire.recorder import Recorder
 from rampe_guard.wire.schema import json_schemas
 from rampe_guard.wire.shelve import Shelve
 from rampe_guard.wire.state import State
@@ -53,6 +54,7 @@ __all__ = [
     "PredictionSweep",
     "Quantiles",
     "Reason",
+    "Recorder",
     "Shelve",
     "State",
     "SweepReply",

@@ -145,4 +145,12 @@ KEYS: Final[tuple[Key, ...]] = (
         "Liveliness token: it goes when the guard's session does. It does not replace the"
         " heartbeat, which stops when the loop is stuck.",
     ),
+    Key(
+        "recorder",
+        "{base}/recorder",
+        "published",
+        "1 Hz from each `rampe-guard record` beside the guard, which also holds a liveliness token"
+        " of this name; nobody's protection depends on it.",
+        "rampe.recorder.v1",
+    ),
 )

@@ -11,6 +11,7 @@ from rampe_guard.wire.alert import Alert
 from rampe_guard.wire.health import Heartbeat
 from rampe_guard.wire.inputs import ActuatorsMessage, EnabledMessage, JoystickMessage, ObjectPose
 from rampe_guard.wire.prediction import Prediction
+from rampe_guard.wire.recorder import Recorder
 from rampe_guard.wire.shelve import Shelve
 from rampe_guard.wire.state import State
 from rampe_guard.wire.sweep import SweepReply, SweepRequest
@@ -31,6 +32,7 @@ _SENT: dict[str, type[msgspec.Struct]] = {
     "rampe.prediction.v1": Prediction,
     "rampe.heartbeat.v1": Heartbeat,
     "rampe.state.v1": State,
+    "rampe.recorder.v1": Recorder,
     "rampe.sweep_reply.v1": SweepReply,
 }
 

@@ -25,7 +25,7 @@ from rampe_guard.core.moving import MovingObjects
 from rampe_guard.core.scene import Box, Capsule, Cylinder, Mesh, Scene, SolidObject, Sphere
 from rampe_guard.core.types import Certificate, FloatArray, Inputs, SweepResult
 from rampe_guard.errors import MessageError
-from rampe_guard.runtime.intake import _placed
+from rampe_guard.runtime.batch import object_sample
 from rampe_guard.settings import load_site
 from tests.support.arms import fork_triangles, write_stl
 from tests.support.processes import BENCH
@@ -95,7 +95,7 @@ class Trial:
                 xyz_m=corner, rpy_rad=message.rpy_rad, quaternion_xyzw=message.quaternion_xyzw
             )
         moving = MovingObjects(moving_objects, InputConfig())
-        samples = tuple(_placed(item.name, message, 0.0) for item in moving_objects)
+        samples = tuple(object_sample(item.name, message, 0.0) for item in moving_objects)
         _, refused = moving.take(Inputs(objects=samples), 0.0)
         assert not refused, refused  # what the wire takes, the core can use
         placed = moving.placements(AGE_S)

@@ -1,0 +1,135 @@
+"""Messages of one step → `Inputs`: the one decoder of live guards and of recordings.
+
+A message that cannot be used becomes a refusal, with the same word wherever it is read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from rampe_guard import wire
+from rampe_guard.core.types import (
+    ActuatorSample,
+    EnabledSample,
+    FloatArray,
+    InputName,
+    Inputs,
+    JoystickSample,
+    ObjectSample,
+)
+from rampe_guard.errors import MessageError
+from rampe_guard.runtime.zenoh_io import Message
+from rampe_guard.settings import Site
+
+Refused = Callable[[str, Message, MessageError], None]
+"""Told of a refusal: a word for its kind, the message, and what is wrong with it."""
+
+
+class Batch:
+    """All that arrived since the last step.
+
+    Args:
+        site: whose keys, axes and actuators count.
+        now_s: when it arrived, on the clock of the steps [s]; the stamp of what has none.
+        refused: told of each refusal.
+    """
+
+    def __init__(self, site: Site, now_s: float, refused: Refused) -> None:
+        self._site, self._now_s, self._tell = site, now_s, refused
+        self._levers: list[JoystickSample] = []
+        self._positions: list[ActuatorSample] = []
+        self._words: list[EnabledSample] = []
+        self._poses: list[ObjectSample] = []
+        self._rejected: list[tuple[InputName, str]] = []
+        self._lost: list[tuple[str, str]] = []
+
+    def joystick(self, message: Message) -> None:
+        """Take what came for the joystick's key."""
+        try:
+            _exact(message, self._site.keys.joystick)
+            decoded = wire.decode_joystick(message.payload, self._site.guard.axes)
+        except MessageError as error:
+            self._refuse("joystick", message, error)
+            return
+        stamp_s = self._now_s if decoded.stamp is None else decoded.stamp
+        self._levers.append(JoystickSample(stamp_s, np.array(decoded.axes), self._now_s))
+
+    def actuators(self, message: Message) -> None:
+        """Take what came for the actuators' key."""
+        try:
+            _exact(message, self._site.keys.actuators)
+            decoded = wire.decode_actuators(message.payload, self._site.actuator_names)
+        except MessageError as error:
+            self._refuse("actuators", message, error)
+            return
+        stamp_s = self._now_s if decoded.stamp is None else decoded.stamp
+        velocity = None if decoded.velocity is None else np.array(decoded.velocity)
+        position = np.array(decoded.position)
+        self._positions.append(ActuatorSample(stamp_s, position, velocity, self._now_s))
+
+    def enabled(self, message: Message) -> None:
+        """Take what came for the enable key."""
+        try:
+            _exact(message, self._site.keys.enabled or "")
+            said = wire.decode_enabled(message.payload)
+        except MessageError as error:
+            self._refuse("enabled", message, error)
+            return
+        stamp_s = self._now_s if said.stamp is None else said.stamp
+        stamped = said.stamp is not None
+        self._words.append(EnabledSample(said.enabled, stamp_s, self._now_s, stamped=stamped))
+
+    def pose(self, name: str, key: str, message: Message) -> None:
+        """Take what came for the ``key`` of the object ``name``."""
+        try:
+            _exact(message, key)
+            placed = wire.decode_object_pose(message.payload)
+        except MessageError as error:
+            self._lost.append((name, error.reason))
+            self._tell(f"object {name}:{error.reason}", message, error)
+            return
+        self._poses.append(object_sample(name, placed, self._now_s))
+
+    def inputs(self, joystick_alive: bool | None) -> Inputs:
+        """All of it, as `Guard.step` takes it."""
+        return Inputs(
+            tuple(self._levers),
+            tuple(self._positions),
+            tuple(self._rejected),
+            joystick_alive,
+            tuple(self._poses),
+            tuple(self._lost),
+            enabled=tuple(self._words),
+        )
+
+    def _refuse(self, name: InputName, message: Message, error: MessageError) -> None:
+        self._rejected.append((name, error.reason))
+        self._tell(f"{name}:{error.reason}", message, error)
+
+
+def object_sample(name: str, message: wire.ObjectPose, now_s: float) -> ObjectSample:
+    """What a message that arrived at ``now_s`` [s] says of the object ``name``."""
+    stamped = message.stamp is not None
+    stamp_s = now_s if message.stamp is None else message.stamp
+    return ObjectSample(name, pose_of(message), stamp_s, now_s, stamped=stamped)
+
+
+def pose_of(message: wire.ObjectPose) -> FloatArray:
+    """Pose (4, 4) of a message; ``rpy`` turns about the fixed axes, as in URDF."""
+    if message.quaternion_xyzw is not None:
+        rotation = Rotation.from_quat(message.quaternion_xyzw)
+    else:
+        rotation = Rotation.from_euler("xyz", message.rpy_rad or (0.0, 0.0, 0.0))
+    pose = np.eye(4)
+    pose[:3, :3] = rotation.as_matrix()
+    pose[:3, 3] = message.xyz_m
+    return pose
+
+
+def _exact(message: Message, key: str) -> None:
+    """A put on a wildcard reaches every subscriber that it matches; only exact keys count."""
+    if message.key != key:
+        raise MessageError("wildcard_key", f"put on {message.key!r}, expected {key!r}")
