@@ -1,8 +1,11 @@
 """Where the compiled kernels of the sweep are kept.
 
 numba looks only at the file of the outermost kernel when it asks whether its machine code is
-still good. So the folder's name carries a digest of all kernels: change one, and all are
-compiled anew.
+still good. So the folder's name carries a digest of all kernels and of the compiler: change one,
+and all are compiled anew. Within it numba gives each place where the package lies a folder of its
+own; we link all these to one, so that a checkout, a wheel and the next installation of the same
+kernels compile once between them. Python and processor are told apart by numba, in its file names
+and its index.
 """
 
 from __future__ import annotations
@@ -10,13 +13,24 @@ from __future__ import annotations
 import fcntl
 import hashlib
 import os
+import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from importlib.util import find_spec
 from pathlib import Path
 
 COMPILED = "search_kernel.search-*.nbi"
 """What numba keeps of the outermost kernel."""
 KERNELS = ("*_kernel.py", "gjk.py", "kernel_data.py", "compiled.py")
+COMPILER = {"numba": "_version.py", "llvmlite": "_version.py", "numpy": "version.py"}
+"""Packages that decide what the machine code is, and the file that holds their version: reading
+it is quicker than to import them."""
+KEPT_FOLDERS = 4
+UNUSED_S = 24 * 3600.0
+"""Folders of other kernels are kept if used as late as this before the newest [s], or among so
+many newest: two versions may take turns on a machine."""
+_CORE = Path(__file__).parent / "core"
+_SHARED = "shared"
 
 
 def choose_folder() -> None:
@@ -24,25 +38,41 @@ def choose_folder() -> None:
 
     Where no folder of the user's can be written, numba's own choice is left to it.
     """
-    core = Path(__file__).parent / "core"
-    digest = hashlib.sha256()
-    for pattern in KERNELS:
-        for file in sorted(core.glob(pattern)):
-            digest.update(file.read_bytes())
-    name = f"kernels-{digest.hexdigest()[:16]}"
-    told = Path(os.environ.get("NUMBA_CACHE_DIR", "")).name
-    if told and (told == name or not told.startswith("kernels-")):
-        return  # by the user, or by the process that started this one, for the same kernels
+    name = f"kernels-{_digest()}"
+    told = Path(os.environ.get("NUMBA_CACHE_DIR", ""))
+    if told.name == name:  # by the process that started this one
+        _share(told)
+        return
+    if told.name and not told.name.startswith("kernels-"):
+        return  # by the user
     chosen = os.environ.get("RAMPE_GUARD_CACHE")
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     base = Path(chosen) if chosen else home / "rampe-guard"
     folder = base / name
+    new = not folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:
         return
     if os.access(folder, os.W_OK):
         os.environ["NUMBA_CACHE_DIR"] = str(folder)
+        _share(folder)
+        with suppress(OSError):
+            os.utime(folder)  # used just now
+        if new:
+            forget_old(base)
+
+
+def forget_old(base: Path) -> None:
+    """Delete the folders of kernels that nobody has used for longest, all but the newest few."""
+    used = []
+    for folder in base.glob("kernels-*"):
+        with suppress(OSError):  # another process may be deleting too
+            used.append((folder.stat().st_mtime, folder))
+    used.sort(reverse=True)
+    for when, folder in used[KEPT_FOLDERS:]:
+        if when < used[0][0] - UNUSED_S:
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def kept() -> bool:
@@ -76,3 +106,30 @@ def _folder() -> Path | None:
 
     path = getattr(getattr(search, "stats", None), "cache_path", None)
     return None if path is None else Path(path)
+
+
+def _digest() -> str:
+    """Of all that decides the machine code, but Python and the processor."""
+    digest = hashlib.sha256()
+    for pattern in KERNELS:
+        for file in sorted(_CORE.glob(pattern)):
+            digest.update(file.read_bytes())
+    for package, version in COMPILER.items():
+        spec = find_spec(package)
+        if spec is not None and spec.origin is not None:
+            with suppress(OSError):
+                digest.update(Path(spec.origin).with_name(version).read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _share(folder: Path) -> None:
+    """Where numba will keep the kernels of this very place, put a link to what all places share.
+
+    The name is numba's (`get_suitable_cache_subpath`). If another release chooses another, or
+    links cannot be made, each place has its own folder again, and compiles for itself.
+    """
+    place = os.path.abspath(_CORE)  # noqa: PTH100  # as numba does, links unresolved
+    own = folder / f"{_CORE.name}_{hashlib.sha1(place.encode(), usedforsecurity=False).hexdigest()}"
+    with suppress(OSError):
+        (folder / _SHARED).mkdir(exist_ok=True)
+        own.symlink_to(_SHARED)
