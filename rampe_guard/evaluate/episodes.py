@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from rampe_guard.core.alarm import Level
+from rampe_guard.core.types import FloatArray
 
 SILENCE_S = 0.5
 """Spans parted by no more than this belong to one episode [s]."""
@@ -56,6 +59,12 @@ def contact_episodes(contacts: Iterable[Contact], zone: str) -> tuple[Contact, .
             unknown=last.unknown or contact.unknown,
         )
     return tuple(joined)
+
+
+def contact_times(contacts: Iterable[Contact]) -> FloatArray:
+    """Entry and leaving of each contact (c, 2) [s]; inf while it is still in."""
+    times = [(c.entered_s, _or_inf(c.left_s)) for c in contacts]
+    return np.array(times, dtype=np.float64).reshape(-1, 2)
 
 
 def alert_episodes(

@@ -6,6 +6,7 @@ slips through between two samples, and it knows nothing of forecasts or alerts.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,8 +14,10 @@ import numpy as np
 from rampe_guard.core.types import Certificate, FloatArray, PathSweeper, ZoneSweep
 from rampe_guard.evaluate.episodes import Contact
 
-LEAVE = 0.005
-"""An arm is out of a zone again when it is clear by this much [m] (limits: actuator unit).
+LEAVE_M = 0.005
+LEAVE_LIMIT = 0.0005
+"""An arm is out of a zone again when it is clear by this much: [m], or the actuator's unit for
+an actuator limit, where half a millimetre of stroke or milliradian is no tremble any more.
 
 An arm that rests at an edge crosses it with every tremble of its encoders; that is no entry.
 """
@@ -33,12 +36,14 @@ class Referee:
     """Follows the arm and keeps every contact; `feed` it samples in order of time.
 
     An entry is timed by the contact fraction of the sweep that found it. Leaving is known
-    at the first sample outside by `LEAVE`. A sweep without an answer counts as contact, from
+    at the first sample outside by `LEAVE_M`. A sweep without an answer counts as contact, from
     the first fraction that it could not certify, and is marked ``unknown``.
     """
 
-    def __init__(self, sweeper: PathSweeper) -> None:
+    def __init__(self, sweeper: PathSweeper, zones: Iterable[str] | None = None) -> None:
+        """Follow all zones of ``sweeper``, or only those of these names."""
         self._sweeper = sweeper
+        self._only = None if zones is None else frozenset(zones)
         self._last: tuple[float, FloatArray] | None = None
         self._open: dict[str, Contact] = {}
         self._closed: list[Contact] = []
@@ -71,7 +76,7 @@ class Referee:
         # The first sample is a sweep of no length: is the arm inside something already?
         from_s, start = (time_s, position) if self._last is None else self._last
         self._last = (time_s, position)
-        result = self._sweeper.sweep(start, position - start, clearance=False)
+        result = self._sweeper.sweep(start, position - start, clearance=False, only=self._only)
         events: list[ContactEvent] = []
         for zone in result.zones:
             events.extend(self._judge(self._start_known(zone, start), from_s, time_s))
@@ -90,7 +95,8 @@ class Referee:
         free = zone.certificate is Certificate.FREE
         fraction = 0.0 if zone.contact_fraction is None else zone.contact_fraction
         on = self._open.get(zone.zone)
-        out = (free or fraction > 0.0) and (zone.clearance_now_m or 0.0) > LEAVE
+        leave = LEAVE_LIMIT if zone.margin_m is None else LEAVE_M
+        out = (free or fraction > 0.0) and (zone.clearance_now_m or 0.0) > leave
         if on is not None and out:
             closed = replace(on, left_s=from_s)
             self._closed.append(closed)

@@ -18,18 +18,22 @@ Shares are of all contacts: a missed one counts as not early enough.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from statistics import median
 
+import numpy as np
+
 from rampe_guard.core.alarm import Level
 from rampe_guard.evaluate.episodes import (
-    SILENCE_S,
     AlertSpan,
     Contact,
     alert_episodes,
     contact_episodes,
+    contact_times,
 )
+from rampe_guard.evaluate.outcome import FALSE, UNDECIDED, judge
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,23 +102,17 @@ def score_zone(
     if end_s < begin_s:
         raise ValueError(f"window ends at {end_s} s, before it starts at {begin_s} s")
     entries = contact_episodes(contacts, zone)
-    alarms = [
-        (start, end)
-        for start, end in alert_episodes(spans, zone, level)
-        if start <= end_s and end >= begin_s
-    ]
-    empty = [alarm for alarm in alarms if not _has_contact(alarm, entries)]
-    undecided = sum(alarm_end + SILENCE_S > end_s for _, alarm_end in empty)
-    counted = [c for c in entries if begin_s < c.entered_s <= end_s]
-    leads = [_lead_s(c, entries, alarms) for c in counted]
+    alarms = np.array(alert_episodes(spans, zone, level)).reshape(-1, 2)
+    found = judge(contact_times(entries), alarms, window_s)
+    leads = found.lead_s.tolist()
     return LevelScore(
         level=level,
-        leads_s=tuple(lead for lead in leads if lead is not None),
-        missed=sum(lead is None for lead in leads),
-        alarms=len(alarms),
-        false_alarms=len(empty) - undecided,
-        undecided=undecided,
-        unknown_contacts=sum(c.unknown for c in counted),
+        leads_s=tuple(lead for lead in leads if not math.isnan(lead)),
+        missed=sum(map(math.isnan, leads)),
+        alarms=len(found.alarms),
+        false_alarms=int((found.verdict == FALSE).sum()),
+        undecided=int((found.verdict == UNDECIDED).sum()),
+        unknown_contacts=sum(c.unknown for c in entries if begin_s < c.entered_s <= end_s),
         zone_minutes=(end_s - begin_s) / 60.0,
     )
 
@@ -149,25 +147,4 @@ def total(scores: Iterable[LevelScore]) -> LevelScore:
         undecided=sum(part.undecided for part in parts),
         unknown_contacts=sum(part.unknown_contacts for part in parts),
         zone_minutes=sum(part.zone_minutes for part in parts),
-    )
-
-
-def _lead_s(
-    contact: Contact, entries: Sequence[Contact], alarms: Sequence[tuple[float, float]]
-) -> float | None:
-    entered_s = contact.entered_s
-    for start_s, end_s in alarms:
-        if start_s < entered_s <= end_s + SILENCE_S:
-            left_before = (
-                c.left_s for c in entries if c.left_s is not None and c.left_s < entered_s
-            )
-            return entered_s - max([start_s, *left_before])
-    return None
-
-
-def _has_contact(alarm: tuple[float, float], entries: Sequence[Contact]) -> bool:
-    start_s, end_s = alarm
-    return any(
-        c.entered_s <= end_s + SILENCE_S and (c.left_s is None or c.left_s >= start_s)
-        for c in entries
     )

@@ -1,0 +1,93 @@
+"""From traces to figures: a forecaster's point at one threshold, and its whole curve."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from rampe_guard.core.types import FloatArray
+from rampe_guard.evaluate.episodes import Contact, contact_episodes, contact_times
+from rampe_guard.evaluate.outcome import Outcome, judge
+from rampe_guard.evaluate.points import Figures, Pool, Spread, figures, pool, spread
+from rampe_guard.evaluate.trace import Manners, Trace, alarms
+
+THRESHOLDS: Final = tuple(
+    round(float(p), 3)
+    for p in np.concatenate(
+        (np.arange(0.01, 0.2, 0.005), np.arange(0.2, 0.6, 0.01), np.arange(0.6, 1.0, 0.02))
+    )
+)
+"""Thresholds of a curve: dense where alarms come and go with small changes."""
+RATES: Final = (0.5, 1.0, 2.0, 3.0)
+"""False alarms per minute and zone whose nearest points of a curve get intervals."""
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """What truly happened in one log: contacts of each zone (c, 2) [s], and its window [s]."""
+
+    name: str
+    zones: tuple[str, ...]
+    contacts: tuple[FloatArray, ...]
+    window: tuple[float, float]
+
+
+def truth(
+    name: str, zones: tuple[str, ...], contacts: Sequence[Contact], window: tuple[float, float]
+) -> Truth:
+    """Join the contacts of each zone."""
+    joined = tuple(contact_times(contact_episodes(contacts, zone)) for zone in zones)
+    return Truth(name, zones, joined, window)
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """A forecaster at one threshold; ``spread`` only where intervals were asked for."""
+
+    threshold: float
+    figures: Figures
+    spread: Spread | None
+
+
+def outcomes(truth: Truth, trace: Trace, threshold: float, how: Manners) -> tuple[Outcome, ...]:
+    """What became of the alarms of a trace, zone by zone."""
+    return tuple(
+        judge(truth.contacts[z], alarms(trace, z, threshold, how), truth.window)
+        for z in range(len(truth.zones))
+    )
+
+
+def point(
+    truths: Sequence[Truth], traces: Sequence[Trace], threshold: float, how: Manners
+) -> Judged:
+    """One point with its intervals, over all logs."""
+    found = pooled(truths, traces, threshold, how)
+    return Judged(threshold, figures(found), spread(found))
+
+
+def curve(truths: Sequence[Truth], traces: Sequence[Trace], how: Manners) -> list[Judged]:
+    """All thresholds, with intervals at the points nearest to `RATES`."""
+    pools = [pooled(truths, traces, p, how) for p in THRESHOLDS]
+    return with_intervals(THRESHOLDS, pools)
+
+
+def with_intervals(thresholds: Sequence[float], pools: Sequence[Pool]) -> list[Judged]:
+    """Points of a curve, with intervals at those nearest to `RATES`."""
+    reckoned = [figures(found) for found in pools]
+    rates = np.array([f.false_per_min_per_zone or 0.0 for f in reckoned])
+    chosen = {int(np.argmin(np.abs(rates - rate))) for rate in RATES} if len(rates) else set()
+    return [
+        Judged(p, f, spread(found) if k in chosen else None)
+        for k, (p, f, found) in enumerate(zip(thresholds, reckoned, pools, strict=True))
+    ]
+
+
+def pooled(
+    truths: Sequence[Truth], traces: Sequence[Trace], threshold: float, how: Manners
+) -> Pool:
+    """Outcomes of all logs at one threshold."""
+    pairs = zip(truths, traces, strict=True)
+    return pool(outcomes(truth, trace, threshold, how) for truth, trace in pairs)

@@ -1,0 +1,88 @@
+"""What became of the contacts and alarms of one zone, as arrays: the rules of `score`, at speed.
+
+A curve asks for hundreds of scores of the same log, so the rules work on sorted arrays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from rampe_guard.core.types import FloatArray
+from rampe_guard.evaluate.episodes import SILENCE_S
+
+TRUE: Final = 0
+FALSE: Final = 1
+UNDECIDED: Final = 2
+"""What an alarm was: there was a contact, there was none, or the end of the window hides it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """One zone over one window: c contacts that count, a alarms that touch the window.
+
+    Attributes:
+        entered_s: when each contact began (c,) [s].
+        lead_s: lead time of each (c,) [s], nan where it was missed.
+        alarms: start and end of each alarm (a, 2) [s]; inf while it is still on.
+        verdict: `TRUE`, `FALSE` or `UNDECIDED` (a,).
+        window: start and end of what was watched [s].
+    """
+
+    entered_s: FloatArray
+    lead_s: FloatArray
+    alarms: FloatArray
+    verdict: npt.NDArray[np.int8]
+    window: tuple[float, float]
+
+
+def judge(contacts: FloatArray, alarms: FloatArray, window: tuple[float, float]) -> Outcome:
+    """Hold alarms against contacts by the rules of `score`.
+
+    Args:
+        contacts: entry and leaving of each (c, 2) [s], inf while still in; joined and in order.
+        alarms: start and end of each (a, 2) [s], inf while still on; joined and in order.
+        window: start and end [s].
+    """
+    begin_s, end_s = window
+    contacts, alarms = contacts.reshape(-1, 2), alarms.reshape(-1, 2)
+    alarms = alarms[(alarms[:, 0] <= end_s) & (alarms[:, 1] >= begin_s)]
+    counted = (contacts[:, 0] > begin_s) & (contacts[:, 0] <= end_s)
+    return Outcome(
+        entered_s=contacts[counted, 0],
+        lead_s=_leads(contacts, alarms)[counted],
+        alarms=alarms,
+        verdict=_verdicts(contacts, alarms, end_s),
+        window=window,
+    )
+
+
+def _leads(contacts: FloatArray, alarms: FloatArray) -> FloatArray:
+    """Lead time of each contact (c,) [s], nan where it was missed."""
+    entered = contacts[:, 0]
+    if not len(alarms) or not len(contacts):
+        return np.full(len(contacts), np.nan)
+    # alarms are parted by more than the silence: only the last that began before can be on
+    last = np.searchsorted(alarms[:, 0], entered, side="left") - 1
+    on = (last >= 0) & (entered <= alarms[last, 1] + SILENCE_S)
+    left_before = np.concatenate(([-np.inf], contacts[:-1, 1]))
+    left_before[left_before >= entered] = -np.inf
+    lead: FloatArray = np.where(on, entered - np.maximum(alarms[last, 0], left_before), np.nan)
+    return lead
+
+
+def _verdicts(contacts: FloatArray, alarms: FloatArray, end_s: float) -> npt.NDArray[np.int8]:
+    """What each alarm was (a,)."""
+    if not len(alarms):
+        return np.zeros(0, dtype=np.int8)
+    until = alarms[:, 1] + SILENCE_S
+    if len(contacts):
+        last = np.searchsorted(contacts[:, 0], until, side="right") - 1
+        met = (last >= 0) & (contacts[last, 1] >= alarms[:, 0])
+    else:
+        met = np.zeros(len(alarms), dtype=np.bool_)
+    verdict = np.where(met, TRUE, np.where(until > end_s, UNDECIDED, FALSE))
+    return verdict.astype(np.int8)
