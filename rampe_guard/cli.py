@@ -17,9 +17,10 @@ from rampe_guard.options import (
     add_model_actions,
     add_notify,
     add_operator,
+    add_record,
+    add_replay,
     add_site,
     add_watch,
-    positive,
     positive_int,
 )
 
@@ -146,14 +147,30 @@ def _notify(args: argparse.Namespace) -> int:
     return notify(wishes, StopFlag.on_signals())
 
 
+def _record(args: argparse.Namespace) -> int:
+    from rampe_guard.runtime.stopping import StopFlag
+
+    stop = StopFlag.on_signals()  # before the imports, which take a while
+    from rampe_guard.programs.recording import Wishes, record
+    from rampe_guard.runtime.say import configure
+
+    configure()
+    until = (args.rotate_mb, args.rotate_minutes, vars(args)["for"])
+    wishes = Wishes(args.site, args.out, args.connect, args.operator, *until)
+    print(record(wishes, stop))
+    return 0
+
+
 def _replay(args: argparse.Namespace) -> int:
-    from rampe_guard.programs.replaying import replay_live, replay_offline
+    from rampe_guard.programs.replaying import replay_offline
+    from rampe_guard.programs.replaying_live import replay_live
     from rampe_guard.runtime.stopping import StopFlag
 
     stop = StopFlag.on_signals()
     if args.live:
         return replay_live(args.site, args.log, args.connect, args.speed, stop)
-    for line in replay_offline(args.site, args.log, stop, repeats=args.repeats):
+    wishes = {"repeats": args.repeats, "compare": args.compare, "fresh": args.fresh}
+    for line in replay_offline(args.site, args.log, stop, **wishes):
         print(line.decode())
     return 0
 
@@ -246,12 +263,11 @@ def _parser() -> argparse.ArgumentParser:
     notify = commands.add_parser("notify", help="alerts to commands, URLs and a sound")
     add_notify(notify)
 
-    replay = commands.add_parser("replay", help="a CSV log through the guard")
-    add_site(replay, connect=True)
-    replay.add_argument("log", help="CSV file; columns as the site file's 'log' says")
-    replay.add_argument("--live", action="store_true", help="publish it onto Zenoh instead")
-    replay.add_argument("--speed", type=positive, default=1.0, help="with --live (default 1)")
-    replay.add_argument("--repeats", action="store_true", help="also print repeats of alerts")
+    record = commands.add_parser("record", help="all that a machine and its guard say, as MCAP")
+    add_record(record)
+
+    replay = commands.add_parser("replay", help="a recording, or a CSV log, through the guard")
+    add_replay(replay)
 
     evaluate = commands.add_parser("evaluate", help="how good forecasts are on recorded work")
     add_site(evaluate)
@@ -290,6 +306,7 @@ _COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "watch": _watch,
     "dashboard": _dashboard,
     "notify": _notify,
+    "record": _record,
     "replay": _replay,
     "evaluate": _evaluate,
     "paper": _paper,

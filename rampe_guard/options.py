@@ -108,6 +108,34 @@ def add_dashboard(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--port", type=port, default=8080, help="0: any free (default 8080)")
 
 
+def add_record(parser: argparse.ArgumentParser) -> None:
+    """Machine, file, and when the next file begins."""
+    add_site(parser, connect=True)
+    parser.add_argument("out", help="file to begin with, such as OUT.mcap; OUT-0002.mcap follows")
+    add_operator(parser)
+    size, age = "size at which the next file begins", "age at which it does"
+    parser.add_argument("--rotate-mb", type=positive, default=1000.0, help=f"{size} (default 1000)")
+    parser.add_argument("--rotate-minutes", type=positive, default=60.0, help=f"{age} (default 60)")
+    text = "for how long; without it until it is stopped"
+    parser.add_argument("--for", type=positive, metavar="SECONDS", help=text)
+
+
+def add_replay(parser: argparse.ArgumentParser) -> None:
+    """A log, and what becomes of it."""
+    parser.add_argument("site", nargs="?", help="site file (YAML) instead of the recorded one")
+    parser.add_argument("log", help="recording (MCAP), or a CSV file as the site file's 'log' says")
+    add_connect(parser)
+    parser.add_argument("--live", action="store_true", help="publish its inputs onto Zenoh instead")
+    parser.add_argument("--speed", type=positive, default=1.0, help="with --live (default 1)")
+    parser.add_argument("--repeats", action="store_true", help="also print repeats of alerts")
+    parser.add_argument(
+        "--compare", action="store_true", help="with the alerts that were given live, on stderr"
+    )
+    parser.add_argument(
+        "--fresh", action="store_true", help="without what had been learned before the recording"
+    )
+
+
 def add_connect(parser: argparse.ArgumentParser) -> None:
     """Zenoh endpoints."""
     parser.add_argument(

@@ -1,54 +1,130 @@
-"""``rampe-guard replay``: a CSV log through the guard, offline, or live onto Zenoh."""
+"""``rampe-guard replay``: a recording or a CSV log through the guard, as fast as it goes."""
 
 from __future__ import annotations
 
+import contextlib
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
-from rich.console import Console
+import numpy as np
+from rich.console import Console, RenderableType
+from rich.table import Table
 
 from rampe_guard import wire
-from rampe_guard.collision import load_arm
+from rampe_guard.assembly import Machine
 from rampe_guard.core.events import SYSTEM_ZONE, AlertEvent
-from rampe_guard.errors import ConnectionFailedError, InterruptedReplayError
+from rampe_guard.core.guard import Guard
+from rampe_guard.errors import InterruptedReplayError, LogError, MessageError, ModelFileError
 from rampe_guard.evaluate.tally import Tally
 from rampe_guard.programs.scoring import closing_table
-from rampe_guard.runtime.connecting import connect_to
-from rampe_guard.runtime.csv_log import CsvLog, read_csv_log
+from rampe_guard.recording import Log, McapLog, McapReading, is_mcap, open_log
+from rampe_guard.recording.compare import ZoneComparison, changes, compare
+from rampe_guard.recording.recorded_site import learned_before, recorded_site
 from rampe_guard.runtime.loading import load_telling
 from rampe_guard.runtime.messages import Scribe
-from rampe_guard.runtime.player import Frame, Player
 from rampe_guard.runtime.replay import replay
 from rampe_guard.runtime.stopping import StopFlag
-from rampe_guard.runtime.zenoh_io import Bus
-from rampe_guard.settings import load_site
+from rampe_guard.runtime.store_format import header_of
+from rampe_guard.runtime.store_keeper import recall
+from rampe_guard.settings import Site, load_site
 
 BOOT_ID = "replay"
 """Boot id of every offline replay: its output depends on nothing but site and log."""
+_SHOWN = 5
+"""So many differences are told one by one."""
 
 
 def replay_offline(
-    site_path: str, log_path: str, stop: StopFlag, *, repeats: bool
+    site_path: str | None,
+    log_path: str,
+    stop: StopFlag,
+    *,
+    repeats: bool,
+    compare: bool = False,
+    fresh: bool = False,
 ) -> Iterator[bytes]:
     """Alerts of a log as JSON lines (times are the log's); the score goes to stderr.
+
+    Args:
+        site_path: the site file; None for that in the recording.
+        log_path: a recording, or a CSV file.
+        stop: ends it.
+        repeats: print repeats of alerts too.
+        compare: hold the alerts against those that were given live, on stderr.
+        fresh: begin without what had been learned before the recording.
 
     Raises:
         LogError: the log cannot be what the site file says.
         InterruptedReplayError: it was told to stop before the end.
     """
-    site = load_site(site_path)
-    machine = load_telling(site)
-    log = _read(read_csv_log(site, log_path, machine.arm.limits))
+    with site_of(site_path, log_path) as site:
+        machine = load_telling(site)
+        log = open_log(site, log_path, machine.arm.limits)
+        if compare and not isinstance(log, McapLog):
+            raise LogError(f"{log_path}: a CSV log has no alerts to compare with")
+        tell_warnings(site, log)
+        guard = machine.guard(log.first_s, BOOT_ID)
+        if isinstance(log, McapLog) and not fresh:
+            _recall(machine, log, guard)
+        told: list[tuple[float, str | None, str]] = []
+        yield from _lines(machine, log, guard, stop, told, repeats=repeats)
+        if compare and isinstance(log, McapLog):
+            Console(stderr=True).print(comparison(log, told))
+
+
+@contextlib.contextmanager
+def site_of(site_path: str | None, log_path: str) -> Iterator[Site]:
+    """The site of a file, or else that of the recording itself.
+
+    Raises:
+        LogError: there is neither.
+    """
+    if site_path is not None:
+        yield load_site(site_path)
+        return
+    if not is_mcap(log_path):
+        raise LogError(f"{log_path}: a CSV log has no site in it; give SITE before it")
+    with recorded_site(McapReading(log_path)) as site:
+        yield site
+
+
+def tell_warnings(site: Site, log: Log) -> None:
+    """What of a log is left out or missing, on stderr."""
+    for warning in log.warnings:
+        print(f"warning: {warning}", file=sys.stderr)  # noqa: T201
     for item in site.scene.moving:
-        print(  # noqa: T201
-            f"warning: the log has no poses of {item.name} ({item.key}): it is unknown"
-            " throughout, and taken as contact",
-            file=sys.stderr,
-        )
-    guard = machine.guard(float(log.time_s[0]), BOOT_ID)
-    scribe = Scribe(site, BOOT_ID, lambda now_s: now_s)
+        if item.name not in log.objects:
+            print(  # noqa: T201
+                f"warning: the log has no poses of {item.name} ({item.key}): it is unknown"
+                " throughout, and taken as contact",
+                file=sys.stderr,
+            )
+
+
+def _recall(machine: Machine, log: McapLog, guard: Guard) -> None:
+    """Begin with what the recorded guard's memory held."""
+    content = learned_before(log.reading)
+    if content is None:
+        return
+    try:
+        recall(content, header_of(machine.site, machine.arm.limits), guard.rampe)
+    except ModelFileError as error:
+        text = f"what was learned before the recording is not used: {error}"
+        print(f"warning: {log.path}: {text}", file=sys.stderr)  # noqa: T201
+
+
+def _lines(
+    machine: Machine,
+    log: Log,
+    guard: Guard,
+    stop: StopFlag,
+    told: list[tuple[float, str | None, str]],
+    *,
+    repeats: bool,
+) -> Iterator[bytes]:
+    scribe = Scribe(machine.site, BOOT_ID, lambda now_s: log.epoch_s + now_s)
     tally = Tally(machine.sweeper, machine.sweeper.zones)
-    for t, q in zip(log.time_s.tolist(), log.position, strict=True):
+    for t, q in log.positions():
         if stop():
             raise InterruptedReplayError("interrupted: no score")
         tally.position(t, q)
@@ -58,6 +134,7 @@ def replay_offline(
         for event in events:
             if not isinstance(event, AlertEvent):
                 continue
+            told.append((now_s, event.zone, event.level.word))
             if event.zone != SYSTEM_ZONE:
                 tally.alert(now_s, event.zone, event.level)
             if repeats or event.kind == "transition":
@@ -65,33 +142,34 @@ def replay_offline(
     Console(stderr=True).print(closing_table(tally))
 
 
-def replay_live(
-    site_path: str, log_path: str, endpoints: Sequence[str], speed: float, stop: StopFlag
-) -> int:
-    """Publish a log on the site's keys, ``speed`` times as fast as it was recorded.
-
-    Raises:
-        LogError: the log cannot be what the site file says.
-        ConnectionFailedError: no router, or nobody listens.
-    """
-    site = connect_to(load_site(site_path), endpoints)
-    log = _read(read_csv_log(site, log_path, load_arm(site.arm).limits))
-    with Bus.open(site.zenoh) as bus:
-        player = Player(bus, site)
-        if not player.wait_for_listener(stop):
-            raise ConnectionFailedError(f"nobody listens on {site.keys.actuators}; start the guard")
-        sent = player.play(_frames(log), stop, speed)
-    print(f"{sent} of {len(log.time_s)} rows sent", file=sys.stderr)  # noqa: T201
-    return 0
-
-
-def _frames(log: CsvLog) -> Iterator[Frame]:
-    first_s = float(log.time_s[0])
-    for t, axes, q in zip(log.time_s.tolist(), log.axes, log.position, strict=True):
-        yield Frame(t - first_s, t, axes, q, None)
+def comparison(log: McapLog, told: list[tuple[float, str | None, str]]) -> RenderableType:
+    """Alerts that were given live beside those of the replay, as a table."""
+    live = []
+    for time_s, payload in log.published("alert"):
+        with contextlib.suppress(MessageError):
+            alert = wire.decode(payload, wire.Alert)
+            live.append((time_s, alert.zone, alert.level))
+    table = Table(box=None, padding=(0, 2, 0, 0), title_justify="left", title_style="bold")
+    table.title = "changes of level, live and replayed"
+    for name in ("zone", "same", "only live", "only replayed", "apart: median", "most"):
+        table.add_column(name, justify="left" if name == "zone" else "right", header_style="dim")
+    zones = compare(changes(live), changes(told))
+    for zone in zones:
+        apart_ms = np.abs(zone.apart_s) * 1e3
+        times = [f"{f(apart_ms):.0f} ms" if zone.same else "—" for f in (np.median, np.max)]
+        counts = (zone.same, len(zone.only_live), len(zone.only_replay))
+        table.add_row(zone.zone, *map(str, counts), *times)
+    table.caption = "\n".join(_differences(zones)) or None
+    table.caption_justify = "left"
+    return table
 
 
-def _read(log: CsvLog) -> CsvLog:
-    for warning in log.warnings:
-        print(f"warning: {warning}", file=sys.stderr)  # noqa: T201
-    return log
+def _differences(zones: tuple[ZoneComparison, ...]) -> list[str]:
+    """The first of those that only one side knows, in words."""
+    found = [(t, f"{z.zone} {w} at {t:.2f} s: only live") for z in zones for t, w in z.only_live]
+    found += [
+        (t, f"{z.zone} {w} at {t:.2f} s: only replayed") for z in zones for t, w in z.only_replay
+    ]
+    lines = [text for _, text in sorted(found)]
+    more = len(lines) - _SHOWN
+    return [*lines[:_SHOWN], *([f"and {more} more"] if more > 0 else [])]

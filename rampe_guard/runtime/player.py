@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import chain
+from typing import TypeVar
 
 from rampe_guard import wire
 from rampe_guard.core.types import FloatArray
 from rampe_guard.runtime.stopping import StopFlag
-from rampe_guard.runtime.zenoh_io import Bus
+from rampe_guard.runtime.zenoh_io import Bus, Outbox
 from rampe_guard.settings import Site
+
+T = TypeVar("T")
 
 _PATIENCE_S = 10.0
 _LOOK_S = 0.1
@@ -58,13 +62,45 @@ class Player:
 
     def play(self, frames: Iterable[Frame], stop: StopFlag, speed: float = 1.0) -> int:
         """Send every frame at its time, ``speed`` times as fast; returns how many were sent."""
+        return self._paced(((frame.at_s, frame) for frame in frames), self._send, stop, speed)
+
+    def post(
+        self, posts: Iterable[tuple[float, str, bytes]], stop: StopFlag, speed: float = 1.0
+    ) -> int:
+        """Send messages as they are, (time [s], key, payload), the first at once.
+
+        They may come ``speed`` times as fast; returns how many were sent.
+        """
+        outboxes: dict[str, Outbox] = {}
+        coming = iter(posts)
+        first = next(coming, None)
+        if first is None:
+            return 0
+
+        def put(message: tuple[str, bytes]) -> None:
+            key, payload = message
+            if key not in outboxes:
+                outboxes[key] = self._bus.outbox(key)
+            outboxes[key].put(payload)
+
+        timed = ((at_s - first[0], (key, said)) for at_s, key, said in chain([first], coming))
+        return self._paced(timed, put, stop, speed)
+
+    def _paced(
+        self,
+        items: Iterable[tuple[float, T]],
+        send: Callable[[T], None],
+        stop: StopFlag,
+        speed: float,
+    ) -> int:
+        """Send each at its time from now on [s]; how many were sent."""
         start_s = time.monotonic()
         sent = 0
-        for frame in frames:
-            wait_s = start_s + frame.at_s / speed - time.monotonic()
+        for at_s, item in items:
+            wait_s = start_s + at_s / speed - time.monotonic()
             if stop.wait(wait_s) if wait_s > 0.0 else stop():
                 break
-            self._send(frame)
+            send(item)
             sent += 1
         return sent
 

@@ -1,0 +1,164 @@
+"""The files that a site is made of, as attachments: a recording replays where none of them is.
+
+Attachments are named by their places below the folder that holds all of them, so that the
+relative paths in them stay true wherever they are put. Absolute paths are noted, and written
+anew in the copy. Zenoh's own file is left out, an empty one stands for it: it may hold secrets,
+and no replay needs it.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Final
+
+import yourdfpy
+
+from rampe_guard.collision.urdf import _mesh_file as mesh_file
+from rampe_guard.core.scene import Mesh
+from rampe_guard.errors import GeometryError, LogError
+from rampe_guard.settings import Site
+from rampe_guard.settings.source import MAX_MESH_BYTES, parse, read_bytes
+
+_TEXTS: Final = (".yaml", ".yml", ".urdf", ".xml")
+"""Files that name others."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bundle:
+    """Files by their names, which are relative and in the manner of POSIX.
+
+    Attributes:
+        site: name of the site file among them.
+        files: content of each.
+        absolute: absolute paths that stand in some of them, and the file that each means.
+    """
+
+    site: str
+    files: Mapping[str, bytes]
+    absolute: Mapping[str, str]
+
+
+def gather(site: Site) -> Bundle:
+    """Read all files of a site: its own, scene, URDF, and the meshes of both.
+
+    Raises:
+        SettingsError: one cannot be read.
+        GeometryError: the URDF cannot be read, or a mesh is not where it says.
+    """
+    places = dict(_places(site))
+    root = Path(os.path.commonpath([place.parent for place in places]))
+    names = {place: place.relative_to(root).as_posix() for place in places}
+    files = {
+        names[place]: b"{}\n"
+        if source is None
+        else read_bytes(source, "file", limit=MAX_MESH_BYTES)
+        for place, source in places.items()
+    }
+    absolute = {
+        written: names[place]
+        for written, place in _written(site)
+        if Path(written.removeprefix("file://")).is_absolute()
+    }
+    return Bundle(names[_absolute(site.path)], files, absolute)
+
+
+def unpack(bundle: Bundle, folder: Path) -> Path:
+    """Write all files below ``folder``, and nothing beside it; returns the site file's path.
+
+    Raises:
+        LogError: a name leads out of the folder, or the site file is not among them.
+    """
+    places = {name: folder.joinpath(*_safe(name).parts) for name in bundle.files}
+    if bundle.site not in places:
+        raise LogError(f"there is no site file {bundle.site!a} among the attachments")
+    meant = {
+        written.encode(): os.fsencode(places[name])
+        for written, name in bundle.absolute.items()
+        if name in places
+    }
+    try:
+        for name, content in bundle.files.items():
+            place = places[name]
+            place.parent.mkdir(parents=True, exist_ok=True)
+            with place.open("xb") as file:  # never through a link, nor twice
+                file.write(_renamed(name, content, meant))
+    except OSError as error:
+        raise LogError(f"attachments cannot be put into {folder}: {error.strerror}") from None
+    return places[bundle.site]
+
+
+def _safe(name: str) -> PurePosixPath:
+    path = PurePosixPath(name)
+    odd = any(part in {"", ".", ".."} for part in name.split("/"))
+    if odd or path.is_absolute() or "\\" in name or "\0" in name or ":" in path.parts[0]:
+        raise LogError(
+            f"attachment {ascii(name)[:200]} would lie outside its folder; it is refused"
+        )
+    return path
+
+
+def _renamed(name: str, content: bytes, meant: Mapping[bytes, bytes]) -> bytes:
+    if name.endswith(_TEXTS):
+        for written in sorted(meant, key=len, reverse=True):  # one may begin another
+            content = content.replace(written, meant[written])
+    return content
+
+
+def _places(site: Site) -> Iterator[tuple[Path, str | None]]:
+    """Where each file is as its referrer sees it, and what to read; None: what is left out."""
+    yield _absolute(site.path), site.path
+    yield _absolute(site.scene.path), site.scene.path
+    yield _absolute(site.arm.urdf), site.arm.urdf
+    if site.zenoh.config is not None:
+        yield _absolute(site.zenoh.config), None
+    for item in site.scene.objects:
+        if isinstance(item, Mesh):
+            yield _absolute(item.file), item.file
+    for _, place, found in _urdf_meshes(site.arm.urdf):
+        yield place, str(found)
+
+
+def _written(site: Site) -> Iterator[tuple[str, Path]]:
+    """References as they stand in the files, and which place each means."""
+    document = parse(read_bytes(site.path, "site file"), site.path).data
+    yield document["arm"]["urdf"], _absolute(site.arm.urdf)
+    yield document["scene"], _absolute(site.scene.path)
+    if site.zenoh.config is not None:
+        yield document["zenoh"]["config"], _absolute(site.zenoh.config)
+    scene = parse(read_bytes(site.scene.path, "scene file"), site.scene.path).data
+    files = {item["name"]: item["file"] for item in scene["objects"] if "file" in item}
+    for item in site.scene.objects:
+        if isinstance(item, Mesh):
+            yield files[item.name], _absolute(item.file)
+    for reference, place, _ in _urdf_meshes(site.arm.urdf):
+        yield reference, place
+
+
+def _urdf_meshes(urdf: str) -> list[tuple[str, Path, Path]]:
+    """Per mesh: how the URDF names it, where that is seen from the URDF, and the file."""
+    try:
+        robot = yourdfpy.URDF.load(
+            urdf, load_meshes=False, load_collision_meshes=False, build_scene_graph=False
+        ).robot
+    except Exception as error:  # the reader raises whatever it likes
+        raise GeometryError(f"{urdf}: cannot be read as a URDF: {error}") from error
+    found = []
+    folder, here = _absolute(urdf).parent, Path(urdf).resolve().parent
+    for link in robot.links:
+        for shape in link.collisions or link.visuals:
+            if shape.geometry.mesh is None:
+                continue
+            reference = str(shape.geometry.mesh.filename)
+            file = mesh_file(reference, Path(urdf))
+            place = file
+            if not Path(reference.removeprefix("file://")).is_absolute():
+                place = folder / os.path.relpath(file, here)  # the URDF itself may be a link
+            found.append((reference, _absolute(place), file))
+    return found
+
+
+def _absolute(path: str | Path) -> Path:
+    return Path(os.path.normpath(Path(path).absolute()))

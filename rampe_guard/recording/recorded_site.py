@@ -1,0 +1,54 @@
+"""The site of a recording, from its attachments: no other file is needed."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import msgspec
+
+from rampe_guard.errors import LogError
+from rampe_guard.recording.bundle import Bundle, unpack
+from rampe_guard.recording.reader import McapReading
+from rampe_guard.recording.writer import FILES, METADATA, MODEL
+from rampe_guard.settings import Site, for_operator, load_site
+
+
+@contextlib.contextmanager
+def recorded_site(reading: McapReading) -> Iterator[Site]:
+    """The site as it was recorded, its files in a folder that goes when the context ends.
+
+    Raises:
+        LogError: the file has no such attachments, or not all of them.
+        SettingsError: they are not what this version takes.
+    """
+    words = reading.metadata.get(METADATA)
+    if words is None or not words.get("site_file", "").startswith(FILES):
+        raise LogError(
+            f"{reading.path}: has no site file in it: rampe-guard did not record it, or its"
+            f" beginning is damaged. Name one: rampe-guard replay SITE {reading.path}"
+        )
+    try:
+        absolute = msgspec.json.decode(words.get("absolute", "{}"), type=dict[str, str])
+    except msgspec.DecodeError as error:
+        raise LogError(f"{reading.path}: metadata {METADATA}: absolute: {error}") from None
+    bundle = Bundle(words["site_file"].removeprefix(FILES), reading.contents(FILES), absolute)
+    with tempfile.TemporaryDirectory(prefix="rampe-guard-replay-") as folder:
+        try:
+            path = unpack(bundle, Path(folder))
+        except LogError as error:
+            raise LogError(f"{reading.path}: {error}") from None
+        yield for_operator(load_site(path), words.get("operator"))
+
+
+def learned_before(reading: McapReading) -> bytes | None:
+    """The model that was kept when the recording began; None if none was."""
+    return next(iter(reading.contents(MODEL).values()), None)
+
+
+def absolute_words(bundle: Bundle) -> str:
+    """`Bundle.absolute` as a word of metadata."""
+    return json.dumps(dict(bundle.absolute))
