@@ -139,7 +139,10 @@ def _lines(
                 tally.alert(now_s, event.zone, event.level)
             if repeats or event.kind == "transition":
                 yield wire.encode(scribe.alert(event))
-    Console(stderr=True).print(closing_table(tally))
+    console = Console(stderr=True)
+    console.print(closing_table(tally))
+    if moving := ", ".join(item.name for item in machine.site.scene.moving):
+        console.print(f"Objects that move are not scored: {moving}.", highlight=False)
 
 
 def comparison(log: McapLog, told: list[tuple[float, str | None, str]]) -> RenderableType:

@@ -1,7 +1,9 @@
 """A recorded stretch of work gives the alerts that it gave before, in the same order.
 
 `quarry.csv` is four cycles of the demo's simulated operator, one of which swings too far.
-When a change of behaviour is meant, look at what differs, then write the file anew:
+`bench.mcap` is a recording that is replayed alone, as `tests.support.recorded_work` made it: a
+cart that moves, rubbish on the keys, silence, the enable key.
+When a change of behaviour is meant, look at what differs, then write the files anew:
 ``python tests/replay/test_golden.py``.
 """
 
@@ -16,11 +18,21 @@ from rampe_guard.resources import shipped_site
 from rampe_guard.runtime.stopping import StopFlag
 
 HERE = Path(__file__).parent
-LOG, GOLDEN = HERE / "quarry.csv", HERE / "quarry.alerts.json"
+LOGS = {
+    "quarry": (str(shipped_site("demo")), str(HERE / "quarry.csv")),
+    "bench": (None, str(HERE / "bench.mcap")),
+}
+"""Site file, if the log does not hold it itself, and log."""
+both = pytest.mark.parametrize("name", LOGS)
 
 
-def alerts() -> list[bytes]:
-    return list(replay_offline(str(shipped_site("demo")), str(LOG), StopFlag(), repeats=True))
+def golden(name: str) -> Path:
+    return HERE / f"{name}.alerts.json"
+
+
+def alerts(name: str) -> list[bytes]:
+    site, log = LOGS[name]
+    return list(replay_offline(site, log, StopFlag(), repeats=True))
 
 
 def told(lines: list[bytes]) -> list[list[object]]:
@@ -38,26 +50,35 @@ def told(lines: list[bytes]) -> list[list[object]]:
     return kept
 
 
-def test_replay_gives_the_golden_alerts_and_the_same_bytes_twice() -> None:
-    first, second = alerts(), alerts()
+@both
+def test_replay_gives_the_golden_alerts_and_the_same_bytes_twice(name: str) -> None:
+    first, second = alerts(name), alerts(name)
     assert first == second
-    assert told(first) == json.loads(GOLDEN.read_text())
+    assert told(first) == json.loads(golden(name).read_text())
 
 
-def test_the_golden_run_is_worth_its_name() -> None:
-    golden = json.loads(GOLDEN.read_text())
-    levels = {row[2] for row in golden if row[1] == "wall"}
-    assert {"clear", "imminent"} <= levels
+@pytest.mark.parametrize(
+    ("name", "zone", "levels"),
+    [
+        ("quarry", "wall", {"clear", "imminent"}),
+        ("bench", "crate", {"clear", "imminent"}),
+        ("bench", "cart", {"clear", "imminent"}),
+        ("bench", None, {"clear", "warning"}),  # an input fell silent
+    ],
+)
+def test_the_golden_run_is_worth_its_name(name: str, zone: str | None, levels: set[str]) -> None:
+    assert levels <= {row[2] for row in json.loads(golden(name).read_text()) if row[1] == zone}
 
 
 def test_an_interrupted_replay_has_no_score(capsys: pytest.CaptureFixture[str]) -> None:
     stop = StopFlag()
     stop.set()
     with pytest.raises(InterruptedReplayError):
-        list(replay_offline(str(shipped_site("demo")), str(LOG), stop, repeats=False))
+        list(replay_offline(*LOGS["quarry"], stop, repeats=False))
     assert "contacts" not in capsys.readouterr().err  # meshes being wrapped may be told
 
 
 if __name__ == "__main__":
-    lines = ",\n".join(json.dumps(row) for row in told(alerts()))
-    GOLDEN.write_text(f"[\n{lines}\n]\n")
+    for each in LOGS:
+        lines = ",\n".join(json.dumps(row) for row in told(alerts(each)))
+        golden(each).write_text(f"[\n{lines}\n]\n")
