@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-import trimesh
 
 from rampe_guard.collision.mesh_read import MAX_TRIANGLES, read_mesh, refuse_too_many
 from rampe_guard.collision.mesh_repair import (
@@ -280,6 +279,8 @@ def prism_mesh(radius: float, height: float, sides: int = ROUND_SIDES) -> Triang
 
 def ball_mesh(radius: float) -> TriangleMesh:
     """Polyhedron round a sphere about the origin: it contains the sphere."""
+    import trimesh  # noqa: PLC0415  # half a second, and balls are rare
+
     ball = trimesh.creation.icosphere(subdivisions=3)
     vertices, faces = np.asarray(ball.vertices), np.asarray(ball.faces, dtype=np.int64)
     a, b, c = np.moveaxis(vertices[faces], 1, 0)

@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
 
 from rampe_guard.collision.mesh_topology import IntArray
 from rampe_guard.errors import GeometryError
 
 if TYPE_CHECKING:
+    import trimesh
+
     from rampe_guard.core.types import FloatArray
 
 MAX_TRIANGLES = 2_000_000
@@ -65,6 +66,8 @@ def read_mesh(path: Path) -> RawMesh:
             raw = _binary_stl(path, size)
             if raw is not None:
                 return raw
+        import trimesh  # noqa: PLC0415  # half a second, which our own formats need not wait for
+
         # trimesh cannot say how many there are before it has read them all
         scene = trimesh.load_scene(str(path), process=False)
         loaded = scene.to_mesh()

@@ -13,11 +13,11 @@ import hashlib
 import logging
 import os
 import tempfile
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-import trimesh
 
 from rampe_guard.collision import mesh as meshes
 from rampe_guard.collision import tree_build, tree_split
@@ -27,7 +27,8 @@ from rampe_guard.collision.shape_file import MAGIC, BrokenShapeError, read_shape
 from rampe_guard.errors import GeometryError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
+    from typing import BinaryIO
 
     from rampe_guard.collision.tree_split import Progress
     from rampe_guard.core.types import FloatArray
@@ -36,12 +37,15 @@ ENVIRONMENT: Final = "RAMPE_GUARD_CACHE"
 MOST_BYTES: Final = 2 * 2**30
 """When more is kept, what was not used for longest goes."""
 SUFFIX: Final = ".shape"
+TREE_SUFFIX: Final = ".urdf"
+_KEPT: Final = {SUFFIX, TREE_SUFFIX}
+_DIGEST: Final = hashlib.sha256().digest_size
 _UNFINISHED: Final = ".unfinished-"
 _REFERRING: Final = {".gltf"}
 """Formats whose vertices lie in other files: the file's own bytes do not tell what it holds."""
 _MADE_BY: Final = (
     f"{MAGIC!r} tree {tree_build.VERSION} leaf {tree_split.LEAF} hulls {tree_build.HULLS}"
-    f" trimesh {trimesh.__version__}"
+    f" trimesh {version('trimesh')}"
 )
 """Whatever else decides what comes out; a change makes all that was kept before unfindable."""
 
@@ -79,27 +83,48 @@ class ShapeCache:
 
     def put(self, key: str, shape: Shape) -> None:
         """Keep a shape; the old file or the new one is there at any moment, whole."""
-        if self.folder is None:
-            return
-        name: Path | None = None
         try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            handle, temporary = tempfile.mkstemp(prefix=_UNFINISHED, dir=self.folder)
-            name = Path(temporary)
-            with os.fdopen(handle, "wb") as file:
-                write_shape(file, key, shape)
-            name.replace(self._path(key))
-            self._clear()
+            self._keep(f"{key}{SUFFIX}", lambda file: write_shape(file, key, shape))
         except OSError as error:
-            if name is not None:
-                with contextlib.suppress(OSError):
-                    name.unlink(missing_ok=True)
             if self.trouble is None:
                 self.trouble = (
                     f"shapes of meshes cannot be kept in {self.folder} ({error}): they are built"
                     f" anew at each start; make it writable, or name another in {ENVIRONMENT}"
                 )
                 _log.warning("%s", self.trouble)
+
+    def get_tree(self, key: str) -> bytes | None:
+        """What was read from the URDF of this key, if it is here and whole."""
+        if self.folder is None:
+            return None
+        try:
+            content = (self.folder / f"{key}{TREE_SUFFIX}").read_bytes()
+        except OSError:
+            return None
+        digest, body = content[:_DIGEST], content[_DIGEST:]
+        return body if hashlib.sha256(body).digest() == digest else None
+
+    def put_tree(self, key: str, body: bytes) -> None:
+        """Keep what was read from a URDF; where that cannot be, shapes cannot, and they say so."""
+        content = hashlib.sha256(body).digest() + body
+        with contextlib.suppress(OSError):
+            self._keep(f"{key}{TREE_SUFFIX}", lambda file: file.write(content))
+
+    def _keep(self, name: str, write: Callable[[BinaryIO], object]) -> None:
+        if self.folder is None:
+            return
+        self.folder.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(prefix=_UNFINISHED, dir=self.folder)
+        unfinished = Path(temporary)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                write(file)
+            unfinished.replace(self.folder / name)
+        except OSError:
+            with contextlib.suppress(OSError):
+                unfinished.unlink(missing_ok=True)
+            raise
+        self._clear()
 
     def _path(self, key: str) -> Path:
         assert self.folder is not None  # noqa: S101  # for the reader of types
@@ -110,7 +135,7 @@ class ShapeCache:
         assert self.folder is not None  # noqa: S101
         found = []
         for path in self.folder.iterdir():
-            if path.suffix == SUFFIX or path.name.startswith(_UNFINISHED):
+            if path.suffix in _KEPT or path.name.startswith(_UNFINISHED):
                 with contextlib.suppress(OSError):  # another process may be clearing too
                     state = path.stat()
                     found.append((state.st_mtime, state.st_size, path))
@@ -118,7 +143,7 @@ class ShapeCache:
         total = 0
         for when, size, path in sorted(found, reverse=True):
             total += size
-            forgotten = path.suffix != SUFFIX and when < newest - 3600.0
+            forgotten = path.suffix not in _KEPT and when < newest - 3600.0
             if forgotten or (total > self._most_bytes and when < newest):
                 with contextlib.suppress(OSError):
                     path.unlink(missing_ok=True)

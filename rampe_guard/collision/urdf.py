@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import yourdfpy
 
 from rampe_guard.collision.mesh import (
     LINK_MOST_M,
@@ -20,6 +19,7 @@ from rampe_guard.collision.mesh import (
     open_words,
     prism_mesh,
 )
+from rampe_guard.collision.urdf_tree import Tree, read_tree
 from rampe_guard.core.drive import actuator_value, domain
 from rampe_guard.core.drive_proof import check_monotone
 from rampe_guard.core.kinematics import Chain, ForwardKinematics, JointMap
@@ -100,18 +100,16 @@ def load_arm(description: ArmDescription) -> Arm:
     )
 
 
-def _parse(path: Path) -> Any:
+def _parse(path: Path) -> Tree:
     if not path.is_file():
         raise GeometryError(f"{path}: no such URDF file")
     try:
-        urdf = yourdfpy.URDF.load(
-            str(path), load_meshes=False, load_collision_meshes=False, build_scene_graph=False
-        )
+        tree = read_tree(path)
     except Exception as error:  # the reader raises whatever it likes
         raise GeometryError(f"{path}: cannot be read as a URDF: {error}") from error
-    if not urdf.robot.links:
+    if not tree.links:
         raise GeometryError(f"{path}: no links")
-    return urdf.robot
+    return tree
 
 
 def _joint_maps(
@@ -207,7 +205,9 @@ def _check_joint(name: str, joint: JointMap, kind: str, ends: tuple[float, float
 class _Walk:
     """The tree from its root: movable joints become the chain, all others constants."""
 
-    def __init__(self, robot: Any, maps: dict[str, JointMap], base: FloatArray, path: Path) -> None:
+    def __init__(
+        self, robot: Tree, maps: dict[str, JointMap], base: FloatArray, path: Path
+    ) -> None:
         self.links: list[Any] = []
         self.parents: list[int] = []
         self.joint_names: list[str] = []

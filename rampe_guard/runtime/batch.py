@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from rampe_guard import wire
+from rampe_guard.core.rotation import rotation_of_quaternion, rotation_of_rpy
 from rampe_guard.core.types import (
     ActuatorSample,
     EnabledSample,
@@ -119,12 +119,11 @@ def object_sample(name: str, message: wire.ObjectPose, now_s: float) -> ObjectSa
 
 def pose_of(message: wire.ObjectPose) -> FloatArray:
     """Pose (4, 4) of a message; ``rpy`` turns about the fixed axes, as in URDF."""
-    if message.quaternion_xyzw is not None:
-        rotation = Rotation.from_quat(message.quaternion_xyzw)
-    else:
-        rotation = Rotation.from_euler("xyz", message.rpy_rad or (0.0, 0.0, 0.0))
     pose = np.eye(4)
-    pose[:3, :3] = rotation.as_matrix()
+    if message.quaternion_xyzw is not None:
+        pose[:3, :3] = rotation_of_quaternion(message.quaternion_xyzw)
+    elif message.rpy_rad is not None:
+        pose[:3, :3] = rotation_of_rpy(message.rpy_rad)
     pose[:3, 3] = message.xyz_m
     return pose
 

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from rampe_guard.core.events import SYSTEM_ZONE
+from rampe_guard.core.rotation import rotation_of_rpy
 from rampe_guard.core.scene import (
     SELF_ZONE,
     ActuatorLimit,
@@ -93,7 +93,7 @@ class _Context:
 def pose_matrix(pose: Pose) -> FloatArray:
     """Homogeneous matrix (4, 4) [m] of a pose, read-only."""
     matrix = np.eye(4)
-    matrix[:3, :3] = Rotation.from_euler("xyz", pose.rpy).as_matrix()
+    matrix[:3, :3] = rotation_of_rpy(pose.rpy)
     matrix[:3, 3] = pose.xyz
     matrix.flags.writeable = False
     return matrix
