@@ -6,6 +6,7 @@ their checksums when a file is opened; what follows the last good one is left ou
 
 from __future__ import annotations
 
+import contextlib
 import io
 import struct
 import zlib
@@ -18,7 +19,7 @@ from typing import IO, Final
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata
+from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata, Statistics
 from mcap.stream_reader import breakup_chunk, get_chunk_data_stream
 
 from rampe_guard.errors import LogError
@@ -65,13 +66,17 @@ class McapReading:
         try:
             with Path(path).open("rb") as file:
                 self._end, problem = _whole(file, self.path)
+                told = None if problem else _told_count(file, self._end)
         except OSError as error:
             raise LogError(f"{path}: cannot be read: {error.strerror}") from None
-        self.warnings = (f"{path}: {problem}",) if problem else ()
+        self.warnings: tuple[str, ...] = (f"{path}: {problem}",) if problem else ()
         try:
             self.first_ns, self.last_ns = self._survey()
         except (McapError, ValueError, struct.error) as error:
             raise LogError(f"{path}: is damaged: {type(error).__name__}: {error}") from None
+        if told is not None and told != self.counts.total():
+            text = f"is damaged: it holds {self.counts.total()} messages, and says {told}"
+            self.warnings = (f"{path}: {text}",)
 
     def messages(self) -> Iterator[Recorded]:
         """All messages in the order in which they arrived."""
@@ -135,9 +140,9 @@ class McapReading:
             raise LogError(f"{self.path}: cannot be read: {error.strerror}") from None
 
 
-def _frames(file: IO[bytes], end: int) -> Iterator[tuple[int, int, int]]:
+def _frames(file: IO[bytes], end: int, start: int = len(MAGIC)) -> Iterator[tuple[int, int, int]]:
     """Opcode of each record up to ``end``, and where its content is: offset and length."""
-    at = len(MAGIC)
+    at = start
     while at < end:
         file.seek(at)
         opcode, length = _RECORD.unpack(file.read(_RECORD.size))
@@ -162,6 +167,17 @@ def _whole(file: IO[bytes], path: str) -> tuple[int, str]:
         if opcode in _PROVEN and (why := _flaw(opcode, file.read(length))):
             return at, f"is damaged at byte {at} ({why}): what follows is left out"
         at += _RECORD.size + length
+
+
+def _told_count(file: IO[bytes], end: int) -> int | None:
+    """How many messages a file says that it holds, behind its data; None if it does not say."""
+    size = file.seek(0, io.SEEK_END)
+    with contextlib.suppress(McapError, struct.error):
+        for opcode, at, length in _frames(file, size - len(MAGIC), end):
+            if opcode == Opcode.STATISTICS:
+                file.seek(at)
+                return int(Statistics.read(_stream(file.read(length))).message_count)
+    return None
 
 
 def _flaw(opcode: int, content: bytes) -> str:

@@ -54,29 +54,29 @@ def write_site(folder: Path, *, absolute: bool = False) -> Path:
 
 
 def work(rig: Rig, between: Callable[[], None] = lambda: None) -> None:
-    """Ten seconds: levers, a cart, rubbish, silence and the key; ``between`` in the middle."""
+    """Nine seconds: levers, a cart, rubbish, silence and the key; ``between`` in the middle."""
     with _cart(rig) as drive:
-        time.sleep(0.6)
+        time.sleep(0.4)
         _to_the_crate(rig)
         for rubbish in (b"{", b'{"axes": [NaN, 0, 0, 0]}', b'{"axes": [0, 0]}'):
             rig.lever(rubbish)
         rig.lever({"axes": [0.0, 0.0, 0.0, 0.0]}, "rampe/bench/*/joystick")
         time.sleep(0.3)
         drive(_NEAR_M)
-        time.sleep(1.6)
+        time.sleep(1.2)
         between()
         drive(_FAR_M)
-        time.sleep(1.6)
+        time.sleep(1.2)
         rig.lever({"enabled": False, "stamp": time.time()}, ENABLED)
         time.sleep(0.5)
         rig.lever({"enabled": True, "stamp": time.time()}, ENABLED)
         time.sleep(0.3)
         rig.actuators_on = False
-        time.sleep(1.0)
+        time.sleep(0.8)
         rig.actuators_on = True
         time.sleep(0.6)
         _to_the_crate(rig)
-        time.sleep(0.8)
+        time.sleep(0.6)
 
 
 def _to_the_crate(rig: Rig) -> None:
@@ -112,16 +112,18 @@ def _cart(rig: Rig) -> Iterator[Callable[[float], None]]:
         thread.join()
 
 
-def recorder(folder: Path, site: Path, out: Path, endpoint: str, *more: str) -> Process:
-    """A recorder that records when this returns."""
-    args = ["-m", "rampe_guard", "record", str(site), str(out), "--connect", endpoint, *more]
-    process = Process(folder, "recorder", args)
-    try:
-        process.wait_for("recording bench-excavator")
-    except BaseException:
-        process.close()
-        raise
-    return process
+@contextlib.contextmanager
+def recorders(folder: Path, site: Path, endpoint: str, *names: str) -> Iterator[list[Process]]:
+    """Recorders into files below ``folder``, all started at once; they record."""
+    with contextlib.ExitStack() as stack:
+        args = ["-m", "rampe_guard", "record", str(site), "--connect", endpoint]
+        started = [
+            stack.enter_context(Process(folder, "recorder", [*args, str(folder / name)]))
+            for name in names
+        ]
+        for process in started:
+            process.wait_for("recording bench-excavator")
+        yield started
 
 
 @contextlib.contextmanager
@@ -140,7 +142,7 @@ def main(out: str) -> None:
         endpoint = processes.free_endpoint()
         with (
             processes.router(folder, endpoint),
-            recorder(folder, site_path, folder / "out.mcap", endpoint) as recording,
+            recorders(folder, site_path, endpoint, "out.mcap") as (recording,),
         ):
             with machine(folder, site_path, endpoint, load_site(site_path)) as rig:
                 work(rig)
