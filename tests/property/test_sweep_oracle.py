@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.support.depth import depth
 from tests.support.hard_cases import KINDS, PER_BATCH
 from tests.support.machines import AbsentError, machine
 from tests.support.oracle_run import kind_of, run_batch
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from rampe_guard.collision.urdf import Arm
     from tests.support.hard_cases import Machine
 
-MOTIONS = {"six_axis": 3, "excavator": 3, "zx200": 1}
+MOTIONS = {"six_axis": depth(2, 5), "excavator": depth(2, 5), "zx200": depth(1, 3)}
 SEED = 3
 NEVER = {"missed", "false", "late", "clearance", "now", "place", "any_path"}
 EARLY_M = 0.01

@@ -9,6 +9,7 @@ import pytest
 from rampe_guard.core.displacement import DisplacementForecast
 from rampe_guard.core.rampe import Rampe
 from rampe_guard.core.types import Category, FloatArray
+from tests.support.depth import depth
 
 LIMITS = np.array([[-4.0, 4.0], [0.0, 6.0], [-2.0, 2.0]])
 MEGABYTE = 1e6
@@ -225,6 +226,7 @@ def with_taps(rng: np.random.Generator, size: float) -> float:
     return size * (0.02 * rng.random() if rng.random() < 0.2 else 1.0 + 0.2 * rng.standard_normal())
 
 
+@pytest.mark.no_cover  # statistics over ten thousand primitives
 @pytest.mark.parametrize(
     ("law", "limits"),
     [
@@ -280,10 +282,11 @@ def size_of(thing: Any, seen: set[int]) -> int:
     return sum(size_of(getattr(thing, name, None), seen) for name in names)
 
 
+@pytest.mark.no_cover  # nothing that others do not reach, and half as long
 def test_only_categories_that_were_seen_cost_memory() -> None:
-    """A glove of 28 axes, 3,684 categories of which most are rare, 20,000 primitives."""
+    """A glove of 28 axes, 3,684 categories of which most are rare, 20,000 primitives by night."""
     rng = np.random.default_rng(0)
-    n, total, count = 28, 3_684, 20_000
+    n, total, count = 28, 3_684, depth(6_000, 20_000)
     pool: dict[Category, None] = {}
     while len(pool) < total:
         signs = np.zeros(n, dtype=int)

@@ -13,12 +13,13 @@ from rampe_guard.collision.mesh import load_mesh
 from rampe_guard.collision.shape import shape_of
 from rampe_guard.errors import GeometryError
 from tests.support.arms import box_triangles, write_stl
+from tests.support.depth import depth
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
 ROOT = Path(__file__).parents[2]
-EXAMPLES = 250
+EXAMPLES = depth(80, 500)
 
 
 def run(arguments: list[str], case: Path) -> str:
