@@ -14,6 +14,7 @@ from rampe_guard.options import (
     add_alert_requests,
     add_dashboard,
     add_demo,
+    add_evaluate,
     add_model_actions,
     add_notify,
     add_operator,
@@ -180,9 +181,19 @@ def _evaluate(args: argparse.Namespace) -> int:
 
     from rich.console import Console
 
-    from rampe_guard.programs.evaluating import evaluate
+    from rampe_guard.programs.evaluating import Wishes, evaluate
 
-    return evaluate(args.site, args.log, Path(args.out), Console(), fresh=args.fresh)
+    wishes = Wishes(
+        args.site,
+        tuple(args.log),
+        args.fleet,
+        Path(args.out),
+        args.fresh,
+        args.frozen,
+        args.jobs,
+        args.scheduler,
+    )
+    return evaluate(wishes, Console())
 
 
 def _paper(args: argparse.Namespace) -> int:
@@ -270,10 +281,7 @@ def _parser() -> argparse.ArgumentParser:
     add_replay(replay)
 
     evaluate = commands.add_parser("evaluate", help="how good forecasts are on recorded work")
-    add_site(evaluate)
-    evaluate.add_argument("log", nargs="+", help="CSV files of one operator, in order of time")
-    evaluate.add_argument("--out", default="evaluation", help="folder (default evaluation/)")
-    evaluate.add_argument("--fresh", action="store_true", help="learn each log from nothing")
+    add_evaluate(evaluate)
 
     paper = commands.add_parser("paper", help="the paper's experiment: figures, table, page")
     paper.add_argument("--out", default="paper", help="folder for the results (default paper)")

@@ -79,6 +79,27 @@ def add_model_actions(model: argparse.ArgumentParser) -> None:
             parser.add_argument("--yes", action="store_true", help="needed on a terminal")
 
 
+def add_evaluate(parser: argparse.ArgumentParser) -> None:
+    """Which logs, what is learned from which, and who does the work."""
+    parser.add_argument("site", nargs="?", help="site file (YAML)")
+    parser.add_argument("log", nargs="*", help="logs of one operator, in order of time")
+    parser.add_argument("--out", default="evaluation", help="folder (default evaluation/)")
+    parser.add_argument("--fresh", action="store_true", help="learn each log from nothing")
+    parser.add_argument(
+        "--frozen",
+        type=positive_int,
+        metavar="K",
+        help="learn from the first K logs, then nothing more; judge the others",
+    )
+    parser.add_argument("--jobs", type=positive_int, help="processes (default: one per core)")
+    parser.add_argument(
+        "--fleet", metavar="FILE", help="operators, sites and logs (YAML) instead of SITE and LOG"
+    )
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers do the work"
+    )
+
+
 def add_site(parser: argparse.ArgumentParser, *, connect: bool = False) -> None:
     """The site file, and another network than it names."""
     parser.add_argument("site", help="site file (YAML)")

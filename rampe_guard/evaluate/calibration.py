@@ -45,9 +45,16 @@ class Foretold:
 
 
 def foretell(
-    runs: Sequence[Sequence[Segment]], model: Callable[[], SiteRampe], *, fresh: bool
+    runs: Sequence[Sequence[Segment]],
+    model: Callable[[], SiteRampe],
+    *,
+    fresh: bool,
+    frozen: int | None = None,
 ) -> list[Foretold]:
-    """Walk through all runs: predict, then learn; a new model for each run if ``fresh``."""
+    """Walk through all runs: predict, then learn.
+
+    A new model for each run if ``fresh``; only the first ``frozen`` runs teach anything.
+    """
     learner, seen = model(), Counter[Category]()
     found = []
     for index, segments in enumerate(runs):
@@ -56,8 +63,9 @@ def foretell(
         for segment in segments:
             category = segment.start.category
             found.append(Foretold(segment, learner.distribution(segment.start), seen[category]))
-            learner.observe(segment)
-            seen[category] += 1
+            if frozen is None or index < frozen:
+                learner.observe(segment)
+                seen[category] += 1
     return found
 
 
@@ -103,16 +111,26 @@ class Odds:
         actuator: j (m,).
         said: probability (m,).
         passed: whether it did (m,).
+        seen: occurrences of the category before (m,).
     """
 
     actuator: npt.NDArray[np.int64]
     said: FloatArray
     passed: npt.NDArray[np.bool_]
+    seen: npt.NDArray[np.int64]
 
     def of(self, actuator: int) -> Odds:
         """Those about one actuator."""
-        chosen = self.actuator == actuator
-        return Odds(self.actuator[chosen], self.said[chosen], self.passed[chosen])
+        return self._where(self.actuator == actuator)
+
+    def known(self, occurrences: int) -> Odds:
+        """Those of categories that were seen at least so often before."""
+        return self._where(self.seen >= occurrences)
+
+    def _where(self, chosen: npt.NDArray[np.bool_]) -> Odds:
+        return Odds(
+            self.actuator[chosen], self.said[chosen], self.passed[chosen], self.seen[chosen]
+        )
 
 
 def odds(told: Sequence[Foretold], width: FloatArray, top_speed: FloatArray) -> Odds:
@@ -123,7 +141,7 @@ def odds(told: Sequence[Foretold], width: FloatArray, top_speed: FloatArray) -> 
         width: range of each actuator (n,) [unit].
         top_speed: of each actuator (n,) [unit/s].
     """
-    rows: list[tuple[int, float, bool]] = []
+    rows: list[tuple[int, float, bool, int]] = []
     for one in told:
         if one.forecast is None:
             continue
@@ -134,11 +152,15 @@ def odds(told: Sequence[Foretold], width: FloatArray, top_speed: FloatArray) -> 
             for ahead in AHEAD:
                 distance = moment.progress + ahead * width
                 said = one.forecast.passing(distance, moment.progress, moment.under_way)
-                rows += [(int(j), float(said[j]), bool(reached[j] >= distance[j])) for j in moved]
+                rows += [
+                    (int(j), float(said[j]), bool(reached[j] >= distance[j]), one.seen)
+                    for j in moved
+                ]
     return Odds(
-        actuator=np.array([j for j, _, _ in rows], dtype=np.int64),
-        said=np.array([p for _, p, _ in rows], dtype=np.float64),
-        passed=np.array([b for _, _, b in rows], dtype=bool),
+        actuator=np.array([j for j, *_ in rows], dtype=np.int64),
+        said=np.array([p for _, p, *_ in rows], dtype=np.float64),
+        passed=np.array([b for _, _, b, _ in rows], dtype=bool),
+        seen=np.array([k for *_, k in rows], dtype=np.int64),
     )
 
 

@@ -11,6 +11,8 @@ import warnings
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.spatial.distance import cdist
 
 from rampe_guard.core.types import Category, FloatArray
 from rampe_guard.evaluate.extra import missing
@@ -20,7 +22,7 @@ try:
     from river.linear_model import BayesianLinearRegression
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.gaussian_process import GaussianProcessRegressor
-    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Kernel, WhiteKernel
+    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 except ModuleNotFoundError as error:
     raise missing(error) from error
 
@@ -29,6 +31,9 @@ _WHITE, _WHITE_BOUNDS = 0.5, (1e-3, 2.0)
 _SIGNAL_BOUNDS = (1e-2, 10.0)
 _FEWEST = 5
 """Occurrences below which three hyper-parameters cannot be told from noise."""
+_JITTER = 1e-10
+"""Added to the diagonal, as scikit-learn does."""
+_NO_SCATTER = 10 * np.finfo(np.float64).eps
 _GROWTH = 1.5
 """Hyper-parameters are sought anew when a category has grown by this factor."""
 
@@ -85,7 +90,7 @@ class GaussianProcess:
         self._width = width
         self._optimise = optimise
         self._past: dict[Category, _Past] = {}
-        self._kernels: dict[Category, tuple[int, Kernel]] = {}
+        self._kernels: dict[Category, tuple[int, _Kernel]] = {}
 
     def predict(self, start: Start) -> FloatArray | None:
         """Mean of the process at the start (n,) [unit]."""
@@ -93,8 +98,7 @@ class GaussianProcess:
         if past is None:
             return None
         q, x = np.array(past.q), np.array(past.x)
-        fit = self._fitted(start.category, q, x)
-        mean: FloatArray = fit.predict((start.q / self._width)[None, :])[0]
+        mean = _mean(self._kernel(start.category, q, x), q, x, start.q / self._width)
         return mean * self._width
 
     def observe(self, segment: Segment) -> None:
@@ -103,23 +107,53 @@ class GaussianProcess:
         past.q.append(segment.start.q / self._width)
         past.x.append(segment.displacement / self._width)
 
-    def _fitted(self, category: Category, q: FloatArray, x: FloatArray) -> GaussianProcessRegressor:
-        sought, kernel = self._kernels.get(category, (0, _kernel()))
-        seek = self._optimise and len(q) >= max(_FEWEST, _GROWTH * sought)
-        fit = GaussianProcessRegressor(
-            kernel, optimizer="fmin_l_bfgs_b" if seek else None, normalize_y=True
-        )
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ConvergenceWarning)  # at a bound is an answer, too
-            fit.fit(q, x)
-        if seek:
-            self._kernels[category] = (len(q), fit.kernel_)
-        return fit
+    def _kernel(self, category: Category, q: FloatArray, x: FloatArray) -> _Kernel:
+        """The fixed hyper-parameters, or those found when the category was last sought anew."""
+        sought, found = self._kernels.get(category, (0, _Kernel()))
+        if self._optimise and len(q) >= max(_FEWEST, _GROWTH * sought):
+            found = _sought(found, q, x)
+            self._kernels[category] = (len(q), found)
+        return found
 
 
-def _kernel() -> Kernel:
-    signal = ConstantKernel(1.0, _SIGNAL_BOUNDS) * RBF(_LENGTH, _LENGTH_BOUNDS)
-    return signal + WhiteKernel(_WHITE, _WHITE_BOUNDS)
+@dataclass(frozen=True, slots=True)
+class _Kernel:
+    """Hyper-parameters: variance and length of the RBF, variance of the white noise."""
+
+    signal: float = 1.0
+    length: float = _LENGTH
+    white: float = _WHITE
+
+
+def _sought(start: _Kernel, q: FloatArray, x: FloatArray) -> _Kernel:
+    """The hyper-parameters of the greatest marginal likelihood, by scikit-learn."""
+    signal = ConstantKernel(start.signal, _SIGNAL_BOUNDS) * RBF(start.length, _LENGTH_BOUNDS)
+    kernel = signal + WhiteKernel(start.white, _WHITE_BOUNDS)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConvergenceWarning)  # at a bound is an answer, too
+        fit = GaussianProcessRegressor(kernel, normalize_y=True).fit(q, x)
+    found = fit.kernel_
+    return _Kernel(
+        float(found.k1.k1.constant_value),
+        float(found.k1.k2.length_scale),
+        float(found.k2.noise_level),
+    )
+
+
+def _mean(kernel: _Kernel, q: FloatArray, x: FloatArray, at: FloatArray) -> FloatArray:
+    """Mean (n,) at a start of the process through starts q (m, n) and displacements x (m, n).
+
+    What scikit-learn's regressor gives (a test holds them together), without its checks, which
+    cost more than all the arithmetic.
+    """
+    middle, scale = x.mean(axis=0), x.std(axis=0)
+    scale = np.where(scale < _NO_SCATTER, 1.0, scale)
+    covariance = kernel.signal * np.exp(-0.5 * cdist(q, q, "sqeuclidean") / kernel.length**2)
+    covariance[np.diag_indices(len(q))] += kernel.white + _JITTER
+    weights = cho_solve(cho_factor(covariance, lower=True), (x - middle) / scale)
+    near = kernel.signal * np.exp(-0.5 * ((q - at) ** 2).sum(axis=1) / kernel.length**2)
+    mean: FloatArray = middle + scale * (near @ weights)
+    return mean
 
 
 class RiverLeastSquares:

@@ -16,7 +16,7 @@ from rampe_guard.core.events import SYSTEM_ZONE, AlertEvent
 from rampe_guard.core.guard import Guard
 from rampe_guard.core.types import Certificate
 from rampe_guard.evaluate.trace import Trace
-from rampe_guard.runtime.replay import Steps, replay
+from rampe_guard.runtime.replay import Steps
 
 Knowledge = Arrays
 """What a guard learned of an operator; it can be sent to another process."""
@@ -66,12 +66,15 @@ def guard_trace(
     scores, floors = [], []
     transitions: list[tuple[float, str, Level]] = []
     last: tuple[object, ...] | None = None
-    for now_s, events in replay(guard, log):
+    for now_s, inputs in log.steps():
+        events = guard.step(inputs, now_s)
         transitions += [
             (now_s, event.zone, event.level)
             for event in events
             if isinstance(event, AlertEvent) and event.zone != SYSTEM_ZONE
         ]
+        if not inputs.actuators:
+            continue
         sweeps = guard.snapshot(now_s).sweeps
         if sweeps is last or not sweeps:
             continue

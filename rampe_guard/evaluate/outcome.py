@@ -30,6 +30,8 @@ class Outcome:
         alarms: start and end of each alarm (a, 2) [s]; inf while it is still on.
         verdict: `TRUE`, `FALSE` or `UNDECIDED` (a,).
         window: start and end of what was watched [s].
+        outside_s: time of the window that the arm was not in the zone [s].
+        alarmed_s: how much of that an alarm was on [s].
     """
 
     entered_s: FloatArray
@@ -37,6 +39,8 @@ class Outcome:
     alarms: FloatArray
     verdict: npt.NDArray[np.int8]
     window: tuple[float, float]
+    outside_s: float
+    alarmed_s: float
 
 
 def judge(contacts: FloatArray, alarms: FloatArray, window: tuple[float, float]) -> Outcome:
@@ -57,7 +61,22 @@ def judge(contacts: FloatArray, alarms: FloatArray, window: tuple[float, float])
         alarms=alarms,
         verdict=_verdicts(contacts, alarms, end_s),
         window=window,
+        outside_s=float(np.diff(_outside(contacts, np.array([window]), window))[0, 0]),
+        alarmed_s=float(np.diff(_outside(contacts, alarms, window)).sum()),
     )
+
+
+def _outside(contacts: FloatArray, times: FloatArray, window: tuple[float, float]) -> FloatArray:
+    """Time of the window outside all contacts before each of some times [s], same shape."""
+    times = np.clip(times, *window)
+    if not len(contacts):
+        return times
+    edges = np.clip(contacts, *window)
+    inside = np.concatenate(([0.0], np.cumsum(edges[:, 1] - edges[:, 0])))
+    knots = np.column_stack((edges[:, 0], edges[:, 1])).ravel()
+    reached = np.column_stack((inside[:-1], inside[1:])).ravel()
+    before: FloatArray = np.interp(times, knots, reached)
+    return times - before
 
 
 def _leads(contacts: FloatArray, alarms: FloatArray) -> FloatArray:

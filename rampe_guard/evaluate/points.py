@@ -38,6 +38,8 @@ class Pool:
         minutes: zone minutes of each block (b,).
         alarms: all alarms.
         undecided: those that the end of a log kept from being true or false.
+        outside_s: time outside contact, summed over zones [s].
+        alarmed_s: how much of that an alarm was on [s].
     """
 
     lead_s: FloatArray
@@ -46,6 +48,8 @@ class Pool:
     minutes: FloatArray
     alarms: int
     undecided: int
+    outside_s: float
+    alarmed_s: float
 
 
 def block_count(window: tuple[float, float]) -> int:
@@ -68,6 +72,7 @@ def pool(logs: Iterable[Sequence[Outcome]]) -> Pool:
     false_block: list[IntArray] = []
     minutes: list[FloatArray] = []
     alarms = undecided = first = 0
+    outside_s = alarmed_s = 0.0
     for zones in logs:
         if not zones:
             continue
@@ -79,6 +84,8 @@ def pool(logs: Iterable[Sequence[Outcome]]) -> Pool:
             contact_block.append(first + block_of(outcome.entered_s, window))
             false_block.append(first + block_of(false, window))
             alarms += len(outcome.alarms)
+            outside_s += outcome.outside_s
+            alarmed_s += outcome.alarmed_s
             undecided += int((outcome.verdict == UNDECIDED).sum())
         minutes.append(np.full(count, (window[1] - window[0]) / count * len(zones) / 60.0))
         first += count
@@ -89,6 +96,8 @@ def pool(logs: Iterable[Sequence[Outcome]]) -> Pool:
         minutes=_floats(minutes),
         alarms=alarms,
         undecided=undecided,
+        outside_s=outside_s,
+        alarmed_s=alarmed_s,
     )
 
 
@@ -115,6 +124,7 @@ class Figures:
         undecided: those that the end of a log kept from being true or false.
         zone_minutes: time watched, summed over zones [min].
         false_per_min_per_zone: [1/min].
+        alarmed_share: share of the time outside contact that an alarm was on.
     """
 
     crossings: int
@@ -127,6 +137,7 @@ class Figures:
     undecided: int
     zone_minutes: float
     false_per_min_per_zone: float | None
+    alarmed_share: float | None
 
 
 def figures(of: Pool) -> Figures:
@@ -147,6 +158,7 @@ def figures(of: Pool) -> Figures:
         undecided=of.undecided,
         zone_minutes=minutes,
         false_per_min_per_zone=len(of.false_block) / minutes if minutes > 0.0 else None,
+        alarmed_share=of.alarmed_s / of.outside_s if of.outside_s > 0.0 else None,
     )
 
 

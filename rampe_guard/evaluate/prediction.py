@@ -14,6 +14,7 @@ from rampe_guard.evaluate.calibration import (
     LEVELS,
     Coverage,
     Foretold,
+    Odds,
     Reliability,
     coverage,
     foretell,
@@ -125,7 +126,12 @@ class Prediction:
 
 
 def assess(
-    config: GuardConfig, limits: FloatArray, runs: Sequence[Run], *, fresh: bool
+    config: GuardConfig,
+    limits: FloatArray,
+    runs: Sequence[Run],
+    *,
+    fresh: bool,
+    frozen: int | None = None,
 ) -> Prediction:
     """Let every forecaster predict every primitive of the runs, in their order.
 
@@ -134,14 +140,16 @@ def assess(
         limits: actuator limits (n, 2) [unit], infinite where there are none.
         runs: at least one.
         fresh: each run starts from nothing, instead of what the runs before it taught.
+        frozen: only so many runs teach, and only the others are judged; None for all.
 
     Raises:
         LogError: there is no primitive to predict.
     """
     segments = [run.segments for run in runs]
-    if not any(segments):
-        names = ", ".join(run.name for run in runs)
-        cut_short = sum(run.incomplete for run in runs)
+    judged_runs = runs[frozen or 0 :]
+    if not any(run.segments for run in judged_runs):
+        names = ", ".join(run.name for run in judged_runs)
+        cut_short = sum(run.incomplete for run in judged_runs)
         raise LogError(
             f"{names}: no complete primitive ({cut_short} incomplete): no lever was moved for"
             f" {config.joystick.debounce_s:g} s, so there is nothing to predict"
@@ -163,21 +171,24 @@ def assess(
         )
         return dict(zip(FORECASTERS, members, strict=True))
 
-    trials = prequential(segments, team, fresh=fresh)
-    told = foretell(segments, lambda: SiteRampe(config, limits), fresh=fresh)
+    trials = prequential(segments, team, fresh=fresh, frozen=frozen)
+    judged = trials.run >= (frozen or 0)
+    foretold = foretell(segments, lambda: SiteRampe(config, limits), fresh=fresh, frozen=frozen)
+    told = [one for one, counts in zip(foretold, judged.tolist(), strict=True) if counts]
     top_speed = np.array([a.max_velocity for a in config.actuators])
-    everything = np.ones(len(trials.run), dtype=np.bool_)
+    asked = odds(told, width, top_speed)
+    told_known = [one for one in told if one.seen >= KNOWN]
     return Prediction(
         runs=tuple(runs),
         fresh=fresh,
         width=width,
-        total=_errors(trials, width, everything),
-        by_run=tuple(_errors(trials, width, trials.run == k) for k in range(len(runs))),
-        curve=tuple(learning_curve(trials, width)),
-        ratios=_ratios(trials, width, everything),
-        ratios_known=_ratios(trials, width, known(trials)),
-        calibration=_calibration(told, width, top_speed),
-        calibration_known=_calibration([t for t in told if t.seen >= KNOWN], width, top_speed),
+        total=_errors(trials, width, judged),
+        by_run=tuple(_errors(trials, width, judged & (trials.run == k)) for k in range(len(runs))),
+        curve=tuple(learning_curve(trials, width, judged)),
+        ratios=_ratios(trials, width, judged),
+        ratios_known=_ratios(trials, width, judged & known(trials)),
+        calibration=_calibration(told, asked, len(width)),
+        calibration_known=_calibration(told_known, asked.known(KNOWN), len(width)),
     )
 
 
@@ -196,11 +207,10 @@ def _ratios(trials: Trials, width: FloatArray, chosen: Mask) -> dict[str, Interv
     return {name: ratio(trials, width, chosen, RAMPE, name) for name in others}
 
 
-def _calibration(told: Sequence[Foretold], width: FloatArray, top_speed: FloatArray) -> Calibration:
-    asked = odds(told, width, top_speed)
+def _calibration(told: Sequence[Foretold], asked: Odds, actuators: int) -> Calibration:
     return Calibration(
         forecasts=sum(t.forecast is not None for t in told),
-        coverage=tuple(coverage(told, len(width), level) for level in LEVELS),
+        coverage=tuple(coverage(told, actuators, level) for level in LEVELS),
         overall=reliability(asked),
-        actuators=tuple(reliability(asked.of(j)) for j in range(len(width))),
+        actuators=tuple(reliability(asked.of(j)) for j in range(actuators)),
     )

@@ -113,12 +113,19 @@ class CurvePoint:
     errors: dict[str, float]
 
 
-def learning_curve(trials: Trials, width: FloatArray) -> list[CurvePoint]:
-    """Error against how often the category was seen before; empty bins are left out."""
+def learning_curve(
+    trials: Trials, width: FloatArray, judged: Mask | None = None
+) -> list[CurvePoint]:
+    """Error against how often the category was seen before; empty bins are left out.
+
+    ``judged`` says which primitives count (N,), None for all.
+    """
     squares = _squares(trials, width).sum(axis=2)
     points = []
     for first, end in zip(CURVE_FROM, (*CURVE_FROM[1:], None), strict=True):
         chosen = trials.seen >= first
+        if judged is not None:
+            chosen &= judged
         if end is not None:
             chosen &= trials.seen < end
         if chosen.any():

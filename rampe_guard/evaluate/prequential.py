@@ -45,7 +45,11 @@ class Trials:
 
 
 def prequential(
-    runs: Sequence[Sequence[Segment]], team: Callable[[], Team], *, fresh: bool
+    runs: Sequence[Sequence[Segment]],
+    team: Callable[[], Team],
+    *,
+    fresh: bool,
+    frozen: int | None = None,
 ) -> Trials:
     """Walk through all runs with a team of forecasters.
 
@@ -53,6 +57,7 @@ def prequential(
         runs: primitives of each run, in order; at least one primitive in all.
         team: makes forecasters by name that know nothing yet.
         fresh: every run starts with a new team, instead of what the runs before it taught.
+        frozen: only so many runs teach anything; None for all of them.
     """
     forecasters = team()
     seen: Counter[Category] = Counter()
@@ -67,9 +72,10 @@ def prequential(
             seen_before.append(seen[start.category])
             answered.append([g is not None for g in guesses])
             predicted.append([np.zeros_like(start.q) if g is None else g for g in guesses])
-            for forecaster in forecasters.values():
-                forecaster.observe(segment)
-            seen[start.category] += 1
+            if frozen is None or index < frozen:
+                for forecaster in forecasters.values():
+                    forecaster.observe(segment)
+                seen[start.category] += 1
     everything = [s for segments in runs for s in segments]
     return Trials(
         names=tuple(forecasters),

@@ -58,12 +58,16 @@ class Referee:
         """Zones whose margin the arm is in now."""
         return frozenset(self._open)
 
-    def feed(self, time_s: float, position: FloatArray) -> tuple[ContactEvent, ...]:
+    def feed(
+        self, time_s: float, position: FloatArray, asked: frozenset[str] | None = None
+    ) -> tuple[ContactEvent, ...]:
         """Take the next sample and return what it brought to light.
 
         Args:
             time_s: of the sample [s], later than the one before.
             position: (n,) [unit].
+            asked: the zones that are not known otherwise to be free, by more than what leaving
+                takes, from the sample before to this one; None for all.
 
         Raises:
             ValueError: time does not advance, or a value is not finite.
@@ -76,7 +80,10 @@ class Referee:
         # The first sample is a sweep of no length: is the arm inside something already?
         from_s, start = (time_s, position) if self._last is None else self._last
         self._last = (time_s, position)
-        result = self._sweeper.sweep(start, position - start, clearance=False, only=self._only)
+        only = self._only if asked is None else asked | self._open.keys()
+        if only is not None and not only:
+            return ()
+        result = self._sweeper.sweep(start, position - start, clearance=False, only=only)
         events: list[ContactEvent] = []
         for zone in result.zones:
             events.extend(self._judge(self._start_known(zone, start), from_s, time_s))

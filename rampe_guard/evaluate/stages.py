@@ -12,8 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
+from threading import get_ident
 
 import numpy as np
+from threadpoolctl import threadpool_limits  # comes with scikit-learn
 
 from rampe_guard.assembly import Machine, load_machine
 from rampe_guard.core.types import FloatArray
@@ -22,7 +24,9 @@ from rampe_guard.evaluate.baselines import Raw, raw
 from rampe_guard.evaluate.episodes import Contact
 from rampe_guard.evaluate.guard_trace import GuardRun, guard_trace
 from rampe_guard.evaluate.guard_trace import Knowledge as GuardKnowledge
-from rampe_guard.evaluate.referee import Referee
+from rampe_guard.evaluate.prediction import Prediction, assess
+from rampe_guard.evaluate.referee import LEAVE_LIMIT, Referee
+from rampe_guard.evaluate.segments import cut
 from rampe_guard.evaluate.touch import Touch
 from rampe_guard.evaluate.walk import Knowledge, Walker
 from rampe_guard.runtime.csv_log import read_csv_log
@@ -73,15 +77,16 @@ class Work:
     knowledge: Knowledge
 
 
-@lru_cache(maxsize=2)
-def _machine(site: str, stamp: tuple[int, int]) -> Machine:  # noqa: ARG001 - part of the key
+@lru_cache(maxsize=4)
+def _machine(site: str, content: bytes, thread: int) -> Machine:  # noqa: ARG001 - the key
     return load_machine(load_site(site))
 
 
 def machine_of(site: str) -> Machine:
-    """The machine of a site file, loaded once in each process while the file stays as it is."""
-    stat = Path(site).stat()
-    return _machine(site, (stat.st_mtime_ns, stat.st_size))
+    """The machine of a site file, loaded once in each thread while the files stay as they are."""
+    loaded = load_site(site)  # says in its own words what is wrong with it
+    content = Path(loaded.path).read_bytes() + loaded.scene.content_hash.encode()
+    return _machine(site, content, get_ident())  # a sweeper is for one thread at a time
 
 
 def judged_zones(machine: Machine) -> tuple[str, ...]:
@@ -107,10 +112,11 @@ def work_piece(piece: Piece, knowledge: Knowledge | None) -> Work:
     machine = machine_of(piece.site)
     log = read_csv_log(machine.site, piece.log, machine.arm.limits)
     touch = Touch(machine.sweeper, judged_zones(machine))
-    referee = Referee(machine.sweeper, touch.zones)
     samples = list(log.positions())
-    for time_s, q in samples:
-        referee.feed(time_s, q)
+    positions = np.array([q for _, q in samples])
+    referee = Referee(machine.sweeper, touch.zones)
+    for (time_s, q), asked in zip(samples, touch.near(positions, LEAVE_LIMIT), strict=True):
+        referee.feed(time_s, q, asked)
     walker = Walker(
         machine.site.guard,
         machine.arm.limits,
@@ -121,7 +127,6 @@ def work_piece(piece: Piece, knowledge: Knowledge | None) -> Work:
     moments = walker.follow(log.steps())
     if not moments:
         raise LogError(f"{piece.log}: at no time were both inputs there; nothing to evaluate")
-    positions = np.array([q for _, q in samples])
     return Work(
         name=Path(piece.log).name,
         window=(samples[0][0], samples[-1][0]),
@@ -133,6 +138,21 @@ def work_piece(piece: Piece, knowledge: Knowledge | None) -> Work:
         warnings=tuple(log.warnings),
         knowledge=walker.knowledge,
     )
+
+
+def prediction_piece(
+    site: str, logs: tuple[str, ...], fresh: bool, frozen: int | None
+) -> Prediction:
+    """Forecasts of the next displacement, over all logs.
+
+    Raises:
+        LogError: there is no primitive to predict.
+    """
+    machine = machine_of(site)
+    config, limits = machine.site.guard, machine.arm.limits
+    runs = [cut(config, limits, read_csv_log(machine.site, log, limits)) for log in logs]
+    with threadpool_limits(1):  # the same bits however many cores there are
+        return assess(config, limits, runs, fresh=fresh, frozen=frozen)
 
 
 def _reach(machine: Machine, positions: FloatArray) -> float:

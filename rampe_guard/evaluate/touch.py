@@ -60,6 +60,21 @@ class Touch:
                     found[row, self._column[entry.zone]] = _fraction(entry)
         return found
 
+    def near(self, position: FloatArray, within: float) -> list[frozenset[str]]:
+        """The zones that each step from one position to the next could concern (k).
+
+        All solid ones, and the actuator limits that are no further than ``within`` [unit] at
+        either end of the step: between the ends the distance is never less than at both.
+        """
+        found = [self._solid] * len(position)
+        for item in self._limits:
+            value = position[:, item.actuator]
+            close = _limit_clearance(item, value) <= within
+            close[1:] |= close[:-1].copy()
+            for row in np.flatnonzero(close).tolist():
+                found[row] |= {item.name}
+        return found
+
     def clearance(self, position: FloatArray) -> FloatArray:
         """How far the arm is from each zone (k, z): [m], or the actuator's unit for limits.
 

@@ -1,185 +1,219 @@
-"""``rampe-guard evaluate``: how good are the forecasts on recorded work?"""
+"""``rampe-guard evaluate``: how early, how often in vain, how well foreseen, on recorded work."""
 
 from __future__ import annotations
 
 import json
-import math
+import os
 import sys
-from collections.abc import Sequence
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from rich.console import Console, RenderableType
+import msgspec
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
 from rampe_guard.collision import load_arm
-from rampe_guard.evaluate.prediction import MEAN, PROCESS, RAMPE, ZERO, Prediction, assess
+from rampe_guard.errors import RampeGuardError
+from rampe_guard.evaluate.crew import Findings, Order, crew, evaluate_all
+from rampe_guard.evaluate.foresight import GUARD, report
+from rampe_guard.evaluate.foresight_page import page
 from rampe_guard.evaluate.prediction_plot import draw
-from rampe_guard.evaluate.prediction_report import report
-from rampe_guard.evaluate.prediction_score import KNOWN, Error
-from rampe_guard.evaluate.segments import cut
+from rampe_guard.evaluate.report_model import Point, Report, report_bytes
+from rampe_guard.evaluate.stages import machine_of
+from rampe_guard.programs.evaluating_prediction import prediction_summary, prediction_title
+from rampe_guard.programs.fleet_file import read_fleet
 from rampe_guard.programs.output import output_folder
 from rampe_guard.runtime.csv_log import read_csv_log
-from rampe_guard.settings import Site, load_site
+from rampe_guard.runtime.loading import load_telling
+from rampe_guard.settings import load_site
 
 
-def evaluate(
-    site_path: str, log_paths: Sequence[str], out: Path, console: Console, *, fresh: bool
-) -> int:
-    """Evaluate logs of one operator, in the order given; writes JSON and a plot into ``out``.
+@dataclass(frozen=True, slots=True)
+class Wishes:
+    """What was asked for.
+
+    Attributes:
+        site: path of the site file, None with ``fleet``.
+        logs: paths of logs, in the order in which they are learned.
+        fleet: path of a file that lists sequences, None for one sequence.
+        out: folder for the results.
+        fresh: each log starts from nothing.
+        frozen: only so many logs teach, and only the others are judged.
+        jobs: processes of this machine, None for as many as there are cores.
+        scheduler: address of a Dask scheduler.
+    """
+
+    site: str | None
+    logs: tuple[str, ...]
+    fleet: str | None
+    out: Path
+    fresh: bool
+    frozen: int | None
+    jobs: int | None
+    scheduler: str | None
+
+
+def evaluate(wishes: Wishes, console: Console) -> int:
+    """Evaluate one sequence of logs, or a fleet's; writes reports into a folder.
 
     Raises:
-        SettingsError, GeometryError: the site cannot be used.
+        SettingsError, GeometryError: a site cannot be used.
         LogError: a log cannot be what the site file says, or there is nothing to predict.
+        ConnectionFailedError: no Dask cluster answers.
+        RampeGuardError: what was asked for cannot be.
     """
-    site = load_site(site_path)
-    limits = load_arm(site.arm).limits
-    runs = []
-    for path in log_paths:
-        log = read_csv_log(site, path, limits)
-        for warning in log.warnings:
-            print(f"warning: {warning}", file=sys.stderr)  # noqa: T201
-        runs.append(cut(site.guard, limits, log))
-    prediction = assess(site.guard, limits, runs, fresh=fresh)
-    output_folder(out)
-    content = json.dumps(report(prediction, site), indent=2, allow_nan=False)
-    (out / "prediction.json").write_text(content + "\n", encoding="utf-8")
-    draw(prediction, site.actuator_names, _title(site, prediction), out / "prediction.png")
-    for part in _summary(site, prediction):
-        console.print(part)
-    console.print(Text(f"{out / 'prediction.json'}, {out / 'prediction.png'}", "dim"))
+    begin_s = time.perf_counter()
+    orders = _orders(wishes)
+    for order in orders:  # what is wrong is said at once, not after minutes
+        _check(order)
+    jobs = wishes.jobs or min(os.cpu_count() or 1, 3 * len(orders))
+    if jobs > 1 and wishes.scheduler is None:
+        load_telling(load_site(orders[0].site))  # compiled once, not by each process
+    with crew(jobs, wishes.scheduler) as workers, _progress() as tell:
+        found = evaluate_all(orders, workers, tell)
+    worked_s = 0.0
+    summary: dict[str, Any] = {}
+    for findings in found:
+        out = wishes.out / findings.order.name if wishes.fleet else wishes.out
+        made = _write(findings, output_folder(out))
+        worked_s += made.duration_s
+        _show(made, findings, out, console)
+        summary[findings.order.name] = {
+            "site": made.site,
+            "machine": made.machine,
+            "duration_s": made.duration_s,
+            "operating_point": msgspec.to_builtins(made.forecasts[GUARD].operating_point),
+        }
+    if wishes.fleet is not None:
+        text = json.dumps(summary, indent=1, allow_nan=False)
+        (wishes.out / "fleet.json").write_text(text + "\n", encoding="utf-8")
+    spent_s = time.perf_counter() - begin_s
+    print(  # noqa: T201
+        f"{worked_s:.0f} s of work evaluated in {spent_s:.0f} s: {worked_s / spent_s:.0f} times"
+        " as fast as it was done",
+        file=sys.stderr,
+    )
     return 0
 
 
-def _title(site: Site, prediction: Prediction) -> str:
-    knowledge = "each from nothing" if prediction.fresh else "knowledge carried over"
-    count = len(prediction.runs)
-    logs = "1 log" if count == 1 else f"{count} logs, {knowledge}"
-    return f"{site.machine} at {site.name}: {logs}, {prediction.total.primitives} primitives"
+def _orders(wishes: Wishes) -> tuple[Order, ...]:
+    if wishes.fleet is not None:
+        if wishes.site is not None:
+            raise RampeGuardError("either SITE and LOG, or --fleet FILE, which names them")
+        entries = read_fleet(wishes.fleet)
+        return tuple(Order(e.name, e.site, e.logs, wishes.fresh, wishes.frozen) for e in entries)
+    if wishes.site is None or not wishes.logs:
+        raise RampeGuardError("a site file and at least one log are needed, or --fleet FILE")
+    name = Path(wishes.site).stem
+    return (Order(name, wishes.site, wishes.logs, wishes.fresh, wishes.frozen),)
 
 
-def _summary(site: Site, prediction: Prediction) -> list[RenderableType]:
-    parts: list[RenderableType] = [Text(_title(site, prediction), "bold"), Text("")]
-    parts += [_table(prediction), Text("")]
-    if len(prediction.runs) > 1:
-        parts += [_runs(prediction), Text("")]
-    parts += [*_ratios(prediction), _calibration(site, prediction), Text("")]
-    parts.append(Text(_range(site, prediction), "dim"))
-    return parts
+def _check(order: Order) -> None:
+    if order.frozen is not None and order.frozen >= len(order.logs):
+        raise RampeGuardError(
+            f"{order.name}: --frozen {order.frozen} leaves none of {len(order.logs)} logs to judge"
+        )
+    if order.frozen is not None and order.fresh:
+        raise RampeGuardError("--fresh learns each log from nothing, --frozen does not: choose one")
+    site = load_site(order.site)
+    limits = load_arm(site.arm).limits
+    for path in order.logs:
+        for warning in read_csv_log(site, path, limits).warnings:
+            print(f"warning: {warning}", file=sys.stderr)  # noqa: T201
 
 
-def _grid(title: str, first: str, *columns: str) -> Table:
+class _progress:  # noqa: N801 - a context manager that is used like a function
+    """A bar on stderr if it is a terminal; elsewhere nothing."""
+
+    def __init__(self) -> None:
+        console = Console(stderr=True)
+        self._bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.completed:.0f} of {task.total:.0f}"),
+            TimeElapsedColumn(),
+            console=console,
+            disable=not console.is_terminal,
+            transient=True,
+        )
+
+    def __enter__(self) -> Callable[[int, int], None]:
+        self._bar.start()
+        task = self._bar.add_task("evaluating", total=None)
+
+        def tell(done: int, total: int) -> None:
+            self._bar.update(task, completed=done, total=total)
+
+        return tell
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()
+
+
+def _write(found: Findings, out: Path) -> Report:
+    machine = machine_of(found.order.site)
+    made = report(found, machine)
+    (out / "report.json").write_bytes(report_bytes(made))
+    details = json.dumps(made.prediction_details, indent=2, allow_nan=False)
+    (out / "prediction.json").write_text(details + "\n", encoding="utf-8")
+    (out / "report.html").write_text(page(made), encoding="utf-8")
+    title = prediction_title(machine.site, found.prediction)
+    draw(found.prediction, machine.site.actuator_names, title, out / "prediction.png")
+    return made
+
+
+def _show(made: Report, found: Findings, out: Path, console: Console) -> None:
+    console.print(_table(made))
+    console.print(Text(""))
+    for part in prediction_summary(load_site(found.order.site), found.prediction):
+        console.print(part)
+    files = ("report.html", "report.json", "prediction.json", "prediction.png")
+    console.print(Text(", ".join(str(out / name) for name in files), "dim"))
+
+
+def _table(made: Report) -> Table:
+    minutes = made.duration_s / 60.0
     table = Table(
-        title=title, title_justify="left", title_style="bold", box=None, padding=(0, 2, 0, 0)
+        title=(
+            f"{made.machine} at {made.site}: {made.crossings} crossings of {len(made.zones)} zones"
+            f" in {minutes:.1f} minutes\n{made.knowledge}"
+        ),
+        title_justify="left",
+        title_style="bold",
+        box=None,
+        padding=(0, 2, 0, 0),
     )
-    table.add_column(first, header_style="dim", no_wrap=True)
-    for column in columns:
-        table.add_column(column, header_style="dim", justify="right", no_wrap=True)
+    table.add_column("at the operating point", header_style="dim", no_wrap=True)
+    for name in (
+        "false /min\nand zone",
+        "≥ 0.5 s",
+        "≥ 1.0 s",
+        "≥ 1.5 s",
+        "median\nlead",
+        "missed",
+        "on",
+    ):
+        table.add_column(name, header_style="dim", justify="right", no_wrap=True)
+    for name, forecast in made.forecasts.items():
+        style = "bold" if name == GUARD else None
+        table.add_row(name, *_cells(forecast.operating_point), style=style)
+    for level, of in made.published.items():
+        table.add_row(f"published, {level} or above", *_cells(of.total), style="dim")
     return table
 
 
-def _table(prediction: Prediction) -> Table:
-    total = prediction.total
-    table = _grid(
-        f"error of the next displacement, share of the range\n{total.primitives_known} primitives"
-        f" of categories seen at least {KNOWN} times before, and all {total.primitives}",
-        "forecaster",
-        f"seen ≥ {KNOWN}",
-        "95 %\nbootstrap",
-        "moving\nonly",
-        "all",
-        "answered",
+def _cells(at: Point) -> tuple[str, ...]:
+    shares = (at.warned_0_5_s, at.warned_1_0_s, at.warned_1_5_s)
+    rate, lead = at.false_per_min_per_zone, at.median_lead_s
+    return (
+        "—" if rate is None else f"{rate:.2f}",
+        *("—" if share is None else f"{share:.0%}" for share in shares),
+        "—" if lead is None else f"{lead:.2f} s",
+        str(at.missed),
+        "—" if at.alarmed_share is None else f"{at.alarmed_share:.0%}",
     )
-    for name, error in total.everything.items():
-        table.add_row(
-            name,
-            *_three(total.known.get(name)),
-            f"{error.error:.3f}",
-            f"{error.answered:.0%}",
-            style="bold" if name == RAMPE else None,
-        )
-    return table
-
-
-def _three(error: Error | None) -> tuple[str, str, str]:
-    if error is None:
-        return "—", "—", "—"
-    spread = f"{error.spread.low:.3f}-{error.spread.high:.3f}"
-    return f"{error.error:.3f}", spread, f"{error.moving:.3f}"
-
-
-def _runs(prediction: Prediction) -> Table:
-    shown = (ZERO, MEAN, PROCESS, RAMPE)
-    titles = (
-        "primitives",
-        "cut\nshort",
-        f"seen\n≥ {KNOWN}",
-        *(name.replace(" ", "\n") for name in shown),
-    )
-    table = _grid(f"error by log, seen ≥ {KNOWN}", "log", *titles)
-    for run, found in zip(prediction.runs, prediction.by_run, strict=True):
-        errors = [found.known.get(name) for name in shown]
-        table.add_row(
-            run.name,
-            str(found.primitives),
-            str(run.incomplete),
-            str(found.primitives_known),
-            *("—" if e is None else f"{e.error:.3f}" for e in errors),
-        )
-    return table
-
-
-def _ratios(prediction: Prediction) -> list[RenderableType]:
-    known = prediction.ratios_known
-    ratios, which = (known, f"seen ≥ {KNOWN}") if known else (prediction.ratios, "all")
-    lines: list[RenderableType] = [
-        Text(
-            f"{RAMPE} / {name}, {which}: {ratios[name].median:.2f}"
-            f" (95 % {ratios[name].low:.2f} to {ratios[name].high:.2f})"
-        )
-        for name in (PROCESS, MEAN)
-    ]
-    return [*lines, Text("")]
-
-
-def _calibration(site: Site, prediction: Prediction) -> Table:
-    found = prediction.calibration
-    table = _grid(
-        f"calibration of {RAMPE} ({found.forecasts} forecasts)",
-        "actuator",
-        *(f"inside {c.level:.0%}" for c in found.coverage),
-        "displacements",
-        "calibration error",
-        "answers",
-    )
-    rows = zip(
-        (*site.actuator_names, "all"),
-        zip(*([*c.actuators.tolist(), c.overall] for c in found.coverage), strict=True),
-        (*found.coverage[0].counts.tolist(), found.coverage[0].counts.sum()),
-        (*found.actuators, found.overall),
-        strict=True,
-    )
-    for name, inside, count, odds in rows:
-        table.add_row(
-            name,
-            *(_share(v) for v in inside),
-            str(count),
-            _figure(odds.error),
-            str(odds.counts.sum()),
-            style="bold" if name == "all" else None,
-        )
-    return table
-
-
-def _share(value: float) -> str:
-    return f"{value:.0%}" if math.isfinite(value) else "—"
-
-
-def _figure(value: float) -> str:
-    return f"{value:.3f}" if math.isfinite(value) else "—"
-
-
-def _range(site: Site, prediction: Prediction) -> str:
-    actuators = zip(site.guard.actuators, prediction.width.tolist(), strict=True)
-    widths = ", ".join(f"{a.name} {width:.3g} {a.unit}" for a, width in actuators)
-    return f"range (greatest less smallest position over all logs): {widths}"

@@ -156,19 +156,26 @@ def test_no_forecast_no_answers_no_figure() -> None:
 def test_calibration_error_by_hand() -> None:
     said = np.array([0.05, 0.15, 0.15, 0.72, 0.78, 1.0])
     passed = np.array([False, True, False, True, True, True])
-    found = reliability(Odds(np.array([0, 1, 1, 0, 0, 0]), said, passed))
+    found = reliability(Odds(np.array([0, 1, 1, 0, 0, 0]), said, passed, np.full(6, 9)))
     assert found.counts.tolist() == [1, 2, 0, 0, 0, 0, 0, 2, 0, 1]
     assert found.error == pytest.approx((0.05 + 2 * 0.35 + 2 * 0.25 + 0.0) / 6)
     assert found.happened[1] == 0.5
     assert found.said[7] == pytest.approx(0.75)
-    only = reliability(Odds(np.array([0, 1]), said[:2], passed[:2]).of(1))
+    only = reliability(Odds(np.array([0, 1]), said[:2], passed[:2], np.full(2, 9)).of(1))
     assert only.error == pytest.approx(0.85)
 
 
 @pytest.mark.parametrize(("share", "error"), [(0.7, 0.0), (0.3, 0.4)])
 def test_a_calibrated_and_a_miscalibrated_forecaster(share: float, error: float) -> None:
     passed = np.arange(1000) < 1000 * share
-    found = reliability(Odds(np.zeros(1000, dtype=np.int64), np.full(1000, 0.7), passed))
+    found = reliability(
+        Odds(
+            np.zeros(1000, dtype=np.int64),
+            np.full(1000, 0.7),
+            passed,
+            np.zeros(1000, dtype=np.int64),
+        )
+    )
     assert found.error == pytest.approx(error, abs=1e-9)
 
 

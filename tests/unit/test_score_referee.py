@@ -111,6 +111,6 @@ def test_on_the_demo_machine_a_swing_too_far_is_a_contact_with_the_wall() -> Non
 
 
 def test_trembling_at_the_edge_is_one_contact() -> None:
-    referee = run([0.5, 1.001, 0.999, 1.001, 0.998, 1.002, 0.5, 0.5])
+    referee = run([0.5, 1.0001, 0.9999, 1.0001, 0.9998, 1.0002, 0.5, 0.5])
     assert len(referee.contacts) == 1
     assert referee.contacts[0].left_s is not None

@@ -1,0 +1,352 @@
+"""From what was found out about a sequence to its report."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from typing import Any, Final
+
+import numpy as np
+
+from rampe_guard import __version__
+from rampe_guard.assembly import Machine
+from rampe_guard.core.alarm import Level
+from rampe_guard.core.types import FloatArray
+from rampe_guard.evaluate import report_model as form
+from rampe_guard.evaluate.baselines import (
+    DESCRIPTIONS,
+    FAMILY_NEAR,
+    FAMILY_S,
+    constant_velocity,
+    proximity,
+    traces,
+)
+from rampe_guard.evaluate.crew import Findings
+from rampe_guard.evaluate.episodes import alert_episodes, spans_from_transitions
+from rampe_guard.evaluate.foretold import foretold
+from rampe_guard.evaluate.judging import (
+    Judged,
+    Truth,
+    curve,
+    outcomes,
+    point,
+    pooled,
+    truth,
+    with_intervals,
+)
+from rampe_guard.evaluate.odds import odds
+from rampe_guard.evaluate.outcome import FALSE, TRUE, UNDECIDED, judge
+from rampe_guard.evaluate.points import Figures, Spread, figures, pool, spread
+from rampe_guard.evaluate.prediction_report import report as prediction_report
+from rampe_guard.evaluate.stages import judged_zones
+from rampe_guard.evaluate.touch import Touch
+from rampe_guard.evaluate.trace import Manners, Trace, manners
+
+GUARD: Final = "guard"
+_VERDICTS = {TRUE: "true", FALSE: "false", UNDECIDED: "undecided"}
+_LIBRARIES = ("numpy", "scipy", "scikit-learn", "river")
+_SLUGS = {
+    "running mean": "mean",
+    "RAMPE": "rampe",
+    "RAMPE, faithful": "rampe_faithful",
+    "5 nearest neighbours": "nearest_neighbours_5",
+    "Gaussian process, optimised": "gaussian_process_optimised",
+    "RLS of river": "rls_of_river",
+}
+
+DEFINITIONS: Final = {
+    "crossing": (
+        "the arm's true motion, swept between samples with the guard's certificates, enters a"
+        " zone; a re-entry within 0.5 s of leaving is the same crossing"
+    ),
+    "alarm": (
+        "from the first evaluation at which a forecaster's cause is confirmed to its last cause,"
+        " joined across silence of up to 0.5 s; the guard's alarms need as many evaluations in a"
+        " row as the site's alerts say, those of a yes-or-no baseline only one"
+    ),
+    "warned_x_s": (
+        "share of all crossings whose alarm began at least x s before, and was on at the entry or"
+        " had ended at most 0.5 s before"
+    ),
+    "missed": "crossings without such an alarm",
+    "false_per_min_per_zone": "alarms with no crossing in them or within 0.5 s after",
+    "alarmed_share": "share of the time outside contact, over all zones, that an alarm was on",
+    "lead": (
+        "entry less the start of its alarm, or less the end of the crossing before it within the"
+        " same alarm; medians and quantiles are of warned crossings"
+    ),
+    "operating_point": "at the site's warning probability",
+    "published": (
+        "the same of the guard's own alerts at a level or above, from rise to clear, with all its"
+        " delays and deadbands"
+    ),
+    "interval": "2.5 % and 97.5 % of 1000 bootstrap samples of blocks of half a minute (seeded)",
+    "reliability": (
+        "at every evaluation, of every zone that the arm is not in, and where the log goes on for"
+        " the horizon: the probability said, against whether the arm entered within the horizon"
+    ),
+    "rms": "root mean square error of the next displacement, in shares of the range",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class _Case:
+    """What every part of the report is made from."""
+
+    truths: tuple[Truth, ...]
+    threshold: float
+    how: Manners
+
+
+def report(found: Findings, machine: Machine) -> form.Report:
+    """The report of one sequence.
+
+    Args:
+        found: all of its logs.
+        machine: of its site.
+    """
+    site, order = machine.site, found.order
+    skip = order.frozen or 0
+    works, guards = found.works[skip:], found.guards[skip:]
+    zones = judged_zones(machine)
+    truths = tuple(truth(w.name, zones, w.contacts, w.window) for w in works)
+    alerts = site.guard.alerts
+    case = _Case(truths, alerts.warning_probability, manners(alerts))
+    unit = _units(found, machine, zones)
+    by_log = [traces(w.raw, unit) for w in works]
+    forecasts = {GUARD: _forecast("the guard itself", [g.trace for g in guards], case)}
+    for name, text in DESCRIPTIONS.items():
+        forecasts[name] = _forecast(text, [made[name] for made in by_log], case)
+    details = prediction_report(found.prediction, site)
+    return form.Report(
+        versions={
+            "rampe-guard": __version__,
+            "python": platform.python_version(),
+            **{name: version(name) for name in _LIBRARIES},
+        },
+        name=order.name,
+        site=site.name,
+        machine=site.machine,
+        knowledge=_knowledge(found),
+        zones=zones,
+        zones_left_out=tuple(n for n in machine.sweeper.zones if n not in zones),
+        learned_from=tuple(w.name for w in found.works[:skip]),
+        duration_s=sum(w.window[1] - w.window[0] for w in works),
+        crossings=forecasts[GUARD].operating_point.crossings,
+        warning_probability=case.threshold,
+        definitions=DEFINITIONS,
+        forecasts=forecasts,
+        trade_offs={
+            "constant_velocity": _trade_off(
+                "horizon_s",
+                FAMILY_S,
+                lambda h: [constant_velocity(w.raw, h) for w in works],
+                truths,
+            ),
+            "proximity": _trade_off(
+                "share of the actuator's range, or of the arm's reach",
+                FAMILY_NEAR,
+                lambda near: [proximity(w.raw, near, unit) for w in works],
+                truths,
+            ),
+        },
+        published=_published(truths, [g.transitions for g in guards]),
+        reliability=_reliability(truths, [g.trace for g in guards]),
+        prediction=_prediction(details),
+        prediction_details=details,
+        logs=tuple(
+            form.LogLine(
+                log=w.name,
+                start_s=w.window[0],
+                duration_s=w.window[1] - w.window[0],
+                warnings=w.warnings,
+                zones=_lines(t, g.trace, case),
+            )
+            for w, t, g in zip(works, truths, guards, strict=True)
+        ),
+    )
+
+
+def _knowledge(found: Findings) -> str:
+    order = found.order
+    if order.fresh:
+        return "each log from nothing"
+    if order.frozen is not None:
+        return f"learned from the first {order.frozen} logs, then frozen; the others are judged"
+    return "carried over from log to log: of each log, only those before it were known"
+
+
+def _units(found: Findings, machine: Machine, zones: tuple[str, ...]) -> FloatArray:
+    """By zone: range of the actuator over all logs, or reach of the arm (z,) [unit]."""
+    low = np.min([w.low for w in found.works], axis=0)
+    high = np.max([w.high for w in found.works], axis=0)
+    reach_m = max(w.reach_m for w in found.works)
+    touch = Touch(machine.sweeper, zones)
+    limits = [touch.limit_of(zone) for zone in zones]
+    return np.array(
+        [reach_m if item is None else (high - low)[item.actuator] for item in limits],
+        dtype=np.float64,
+    )
+
+
+def _forecast(text: str, said: Sequence[Trace], case: _Case) -> form.Forecast:
+    binary = all(trace.binary for trace in said)
+    floor = any(trace.floor.any() for trace in said)
+    # a delay would only harm who says yes or no at once
+    how = Manners() if binary and not floor else case.how
+    at = point(case.truths, said, case.threshold, how)
+    leads = pooled(case.truths, said, case.threshold, how).lead_s
+    columns = range(len(case.truths[0].zones))
+    return form.Forecast(
+        description=text,
+        binary=binary,
+        curve=(_point(at, None),)
+        if binary
+        else tuple(_point(j, j.threshold) for j in curve(case.truths, said, how)),
+        operating_point=_point(at, None if binary else case.threshold),
+        by_log={
+            t.name: _point(point([t], [s], case.threshold, how), None if binary else case.threshold)
+            for t, s in zip(case.truths, said, strict=True)
+        },
+        by_zone={
+            case.truths[0].zones[z]: _one_zone(z, said, case, how, binary=binary) for z in columns
+        },
+        leads_s=tuple(None if np.isnan(lead) else lead for lead in leads.tolist()),
+    )
+
+
+def _one_zone(
+    z: int, said: Sequence[Trace], case: _Case, how: Manners, *, binary: bool
+) -> form.Point:
+    alone = [replace(t, zones=(t.zones[z],), contacts=(t.contacts[z],)) for t in case.truths]
+    heard = [Trace(s.time_s, (s.zones[z],), s.score[:, [z]], s.floor[:, [z]]) for s in said]
+    at = point(alone, heard, case.threshold, how)
+    return _point(at, None if binary else case.threshold)
+
+
+def _trade_off(
+    parameter: str,
+    values: Sequence[float],
+    make: Callable[[float], Sequence[Trace]],
+    truths: Sequence[Truth],
+) -> form.TradeOff:
+    pools = [pooled(truths, make(value), 0.5, Manners()) for value in values]
+    return form.TradeOff(
+        parameter=parameter,
+        curve=tuple(_point(j, j.threshold) for j in with_intervals(values, pools)),
+    )
+
+
+def _published(
+    truths: Sequence[Truth], transitions: Sequence[Sequence[tuple[float, str, Level]]]
+) -> dict[str, form.LevelTable]:
+    """The guard's own alerts: of all zones, and of each."""
+    spans = [spans_from_transitions(told) for told in transitions]
+    tables = {}
+    for level in (Level.IMMINENT, Level.WARNING, Level.CAUTION):
+        judged = [
+            tuple(
+                judge(t.contacts[z], np.array(alert_episodes(s, zone, level)), t.window)
+                for z, zone in enumerate(t.zones)
+            )
+            for t, s in zip(truths, spans, strict=True)
+        ]
+        pools = {"": pool(judged)}
+        for z, zone in enumerate(truths[0].zones):
+            pools[zone] = pool((log[z],) for log in judged)
+        points = {
+            zone: _point(Judged(0.0, figures(found), spread(found)), None)
+            for zone, found in pools.items()
+        }
+        tables[level.word] = form.LevelTable(total=points.pop(""), zones=points)
+    return tables
+
+
+def _reliability(truths: Sequence[Truth], said: Sequence[Trace]) -> tuple[form.ReliabilityOf, ...]:
+    tables = []
+    for index, horizon_s in enumerate(said[0].horizons_s):
+        found = odds(*foretold(truths, said, index))
+        tables.append(
+            form.ReliabilityOf(
+                horizon_s=horizon_s,
+                answers=found.answers,
+                calibration_error=found.error,
+                calibration_error_interval=found.spread,
+                bins=tuple(
+                    form.ReliabilityBin(
+                        said=b.said,
+                        happened=b.happened,
+                        happened_interval=b.spread,
+                        count=b.count,
+                    )
+                    for b in found.bins
+                ),
+            )
+        )
+    return tuple(tables)
+
+
+def _prediction(details: Mapping[str, Any]) -> dict[str, form.PredictionError]:
+    total = details["total"]
+    errors = {}
+    for name, everything in total["all"].items():
+        best = total["known"].get(name, everything)
+        low, _, high = best["interval"]
+        slug = _SLUGS.get(name, name.replace(",", "").replace(" ", "_").lower())
+        errors[slug] = form.PredictionError(
+            name=name,
+            rms=best["error"],
+            rms_interval=None if low is None else (low, high),
+            rms_all=everything["error"],
+            answered=everything["answered"],
+        )
+    return errors
+
+
+def _lines(truth: Truth, trace: Trace, case: _Case) -> dict[str, form.ZoneLine]:
+    lines = {}
+    judged = outcomes(truth, trace, case.threshold, case.how)
+    for zone, contacts, outcome in zip(truth.zones, truth.contacts, judged, strict=True):
+        alarms = zip(outcome.alarms.tolist(), outcome.verdict.tolist(), strict=True)
+        lines[zone] = form.ZoneLine(
+            contacts=tuple((a, None if np.isinf(b) else b) for a, b in contacts.tolist()),
+            alarms=tuple((a, b, _VERDICTS[verdict]) for (a, b), verdict in alarms),
+        )
+    return lines
+
+
+def _point(judged: Judged, threshold: float | None) -> form.Point:
+    found: Figures = judged.figures
+    return form.Point(
+        threshold=threshold,
+        false_per_min_per_zone=found.false_per_min_per_zone,
+        alarmed_share=found.alarmed_share,
+        warned_0_5_s=found.warned[0],
+        warned_1_0_s=found.warned[1],
+        warned_1_5_s=found.warned[2],
+        warned_2_0_s=found.warned[3],
+        median_lead_s=found.median_lead_s,
+        lead_5_percent_s=found.lead_5_percent_s,
+        crossings=found.crossings,
+        missed=found.missed,
+        alarms=found.alarms,
+        false_alarms=found.false_alarms,
+        undecided=found.undecided,
+        zone_minutes=found.zone_minutes,
+        intervals=None if judged.spread is None else _intervals(judged.spread),
+    )
+
+
+def _intervals(around: Spread) -> form.Intervals:
+    return form.Intervals(
+        false_per_min_per_zone=around.false_per_min_per_zone,
+        warned_0_5_s=around.warned[0],
+        warned_1_0_s=around.warned[1],
+        warned_1_5_s=around.warned[2],
+        warned_2_0_s=around.warned[3],
+        missed=around.missed,
+        median_lead_s=around.median_lead_s,
+        lead_5_percent_s=around.lead_5_percent_s,
+    )
