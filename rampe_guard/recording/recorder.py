@@ -1,6 +1,6 @@
 """Receives, writes, and tells how it goes. Whatever the disk does, it never stops by itself.
 
-One thread looks for messages a thousand times a second and does nothing else, so that the time
+One thread looks for messages 500 times a second and does nothing else, so that the time
 of an arrival is right however long the disk takes. Another brings what came to the disk twice a
 second. A disk that refuses is tried again every second, with a new file, while what comes waits;
 when no more can wait it is dropped, counted and told.
@@ -22,7 +22,7 @@ from rampe_guard.runtime.say import Sayer
 from rampe_guard.runtime.zenoh_io import Bus
 from rampe_guard.settings import Site
 
-_LOOK_S = 0.001
+_LOOK_S = 0.002
 _COMMIT_S = 0.5
 _RETRY_S = 1.0
 _TELL_S = 1.0
