@@ -14,16 +14,28 @@ import rampe_guard  # noqa: F401
 from rampe_guard.collision.shape_cache import ENVIRONMENT
 
 UNIT = Path(__file__).parent / "unit"
+E2E = Path(__file__).parent / "e2e"
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Count lines in the unit tests only: they must cover the core by themselves.
+    """Choose whose lines are counted, and the order of the files.
 
-    The others run a third faster without being traced.
+    Lines count in the unit tests only: they must cover the core by themselves, and the others run
+    a third faster without being traced. End-to-end files wait much and compute little: spread
+    evenly among the others, they fill a worker's time while the other one computes.
     """
     for item in items:
         if UNIT not in item.path.parents:
             item.add_marker("no_cover")
+    files = list(dict.fromkeys(item.path for item in items))
+    waiting = [file for file in files if E2E in file.parents]
+    computing = [file for file in files if E2E not in file.parents]
+    place = {
+        file: (number + 0.5) / len(group)
+        for group in (waiting, computing)
+        for number, file in enumerate(group)
+    }
+    items.sort(key=lambda item: place[item.path])
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 import signal
+from collections.abc import Callable
 from pathlib import Path
+from subprocess import CompletedProcess
 
 import pytest
 
 import rampe_guard
 from rampe_guard.settings import load_site
-from tests.support.processes import BENCH, ROOT, Process, command
+from tests.support.processes import BENCH, ROOT, Process, called, command
 from tests.support.station import AT_CRATE, REST, Station
 
 pytestmark = pytest.mark.e2e
@@ -22,11 +24,11 @@ def test_version() -> None:
 
 
 def test_schema_of_one_message_and_of_none() -> None:
-    done = command("schema", "rampe.alert.v1")
+    done = called("schema", "rampe.alert.v1")
     assert done.returncode == 0
     schema = json.loads(done.stdout)
     assert {"level", "zone", "link", "text"} <= set(schema["required"])
-    wrong = command("schema", "rampe.alarm.v1")
+    wrong = called("schema", "rampe.alarm.v1")
     assert wrong.returncode == 2
     assert "rampe.alert.v1" in wrong.stderr  # says what there is
     assert "Traceback" not in wrong.stderr
@@ -40,9 +42,13 @@ def test_check_passes_the_shipped_sites(name: str) -> None:
         assert zone.name in done.stdout
 
 
-@pytest.mark.parametrize("name", ["check", "run", "sweep", "watch"])
-def test_a_site_that_is_not_there_ends_with_2(name: str) -> None:
-    done = command(name, "no-such-site.yaml")
+@pytest.mark.parametrize(
+    ("name", "run"), [("check", called), ("sweep", called), ("run", command), ("watch", command)]
+)
+def test_a_site_that_is_not_there_ends_with_2(
+    name: str, run: Callable[..., CompletedProcess[str]]
+) -> None:
+    done = run(name, "no-such-site.yaml")
     assert done.returncode == 2
     assert "no-such-site.yaml" in done.stderr
     assert "Traceback" not in done.stderr
@@ -53,7 +59,7 @@ def test_a_broken_site_is_told_by_file_line_and_key(tmp_path: Path) -> None:
     broken = tmp_path / "broken.yaml"
     broken.write_text(text, "utf-8")
     line = 1 + text[: text.index("max_velocity: fast")].count("\n")
-    done = command("check", broken)
+    done = called("check", broken)
     assert done.returncode == 2
     assert f"broken.yaml:{line}" in done.stderr
     assert "max_velocity" in done.stderr
@@ -107,7 +113,7 @@ def test_ack_of_nothing_ends_with_2(live: Station) -> None:
 
 
 def test_ack_without_a_router_ends_with_2() -> None:
-    done = command("ack", BENCH, "x", "--who", "me", "--connect", "tcp/127.0.0.1:1")
+    done = called("ack", BENCH, "x", "--who", "me", "--connect", "tcp/127.0.0.1:1")
     assert done.returncode == 2
     assert "tcp/127.0.0.1:1" in done.stderr
     assert "Traceback" not in done.stderr

@@ -20,7 +20,7 @@ import pytest
 from rampe_guard.settings import load_site
 from tests.support import processes
 from tests.support.ears import Ears, Heard
-from tests.support.processes import BENCH, DEMO, ROOT, Process, command, environment, until
+from tests.support.processes import BENCH, DEMO, ROOT, Process, called, command, environment, until
 from tests.support.rig import Rig
 from tests.support.station import HANDS_OFF
 
@@ -256,9 +256,13 @@ def test_offline_replay_neither_uses_nor_keeps_a_model(tmp_path: Path) -> None:
     assert not state.exists()
 
 
-def test_a_name_that_is_none_ends_with_2(workplace: Workplace) -> None:
-    for args in (("run",), ("model", "show"), ("model", "reset")):
-        done = command(*args, workplace.site_path, "--operator", " ", state=workplace.state)
+def test_a_name_that_is_none_ends_with_2() -> None:
+    for run, args in (
+        (command, ("run",)),
+        (called, ("model", "show")),
+        (called, ("model", "reset")),
+    ):
+        done = run(*args, BENCH, "--operator", " ")
         assert done.returncode == 2
         assert "operator ' ' is no name" in done.stderr
         assert "Traceback" not in done.stderr

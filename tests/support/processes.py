@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import contextlib
 import functools
+import io
 import os
 import shutil
 import signal
@@ -16,6 +17,8 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Self, TypeVar
+
+from rampe_guard.cli import main
 
 T = TypeVar("T")
 
@@ -199,6 +202,15 @@ def command(
         check=False,
         env=environment(state or _nowhere()),
     )
+
+
+def called(*args: str | Path) -> subprocess.CompletedProcess[str]:
+    """The same within this process, for commands that end by themselves and start nothing."""
+    out, err = io.StringIO(), io.StringIO()
+    given = [str(arg) for arg in args]
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        code = main(given)
+    return subprocess.CompletedProcess(given, code, out.getvalue(), err.getvalue())
 
 
 Identity = tuple[int, str]
