@@ -88,7 +88,7 @@ class McapLog:
 
     def positions(self) -> Iterator[tuple[float, FloatArray]]:
         """Where the arm was: time [s], position (n,) of every sample that the gate accepts."""
-        for time_s, _, position in self._rows():
+        for time_s, _, position in self._rows:
             yield time_s, position
 
     def samples(self) -> Iterator[tuple[JoystickSample, ActuatorSample]]:
@@ -129,17 +129,19 @@ class McapLog:
 
     @cached_property
     def _arrays(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        rows = [(t, u, q) for t, u, q in self._rows() if u is not None]
+        rows = [(t, u, q) for t, u, q in self._rows if u is not None]
         if not rows:
             raise LogError(f"{self.path}: no position for which a lever is known")
         times, axes, positions = zip(*rows, strict=True)
         return np.array(times), np.array(axes), np.array(positions)
 
-    def _rows(self) -> Iterator[tuple[float, FloatArray | None, FloatArray]]:
+    @cached_property
+    def _rows(self) -> list[tuple[float, FloatArray | None, FloatArray]]:
         """Time [s], lever (m,) if known, position (n,) of every accepted actuator sample.
 
         Of several that arrived together, each but the last is as much earlier as its stamp says.
         """
+        rows: list[tuple[float, FloatArray | None, FloatArray]] = []
         config = self._site.guard
         gate = InputGate(config.actuators, self._limits, config.inputs, config.axes)
         lever: FloatArray | None = None
@@ -150,11 +152,12 @@ class McapLog:
                 lever = said.sample.axes if isinstance(said, Accepted) else lever
             verdicts = [gate.actuators(s) for s in sorted(inputs.actuators, key=_stamp)]
             good = [v.sample for v in verdicts if isinstance(v, Accepted)]
-            for sample_ in good:
-                time_s = now_s - (good[-1].stamp_s - sample_.stamp_s)
+            for moved in good:
+                time_s = now_s - (good[-1].stamp_s - moved.stamp_s)
                 if time_s > last_s:
                     last_s = time_s
-                    yield time_s, lever, sample_.position
+                    rows.append((time_s, lever, moved.position))
+        return rows
 
     def _arrivals(
         self, roles: tuple[str, ...]

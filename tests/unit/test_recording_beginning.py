@@ -1,0 +1,134 @@
+"""What waits is bounded and counted; each file begins with what the guard really used."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from rampe_guard import wire
+from rampe_guard.assembly import load_machine
+from rampe_guard.core.guard import Guard
+from rampe_guard.programs.recording import GUARD, _Beginning, summary
+from rampe_guard.programs.replaying import _recall
+from rampe_guard.recording import McapLog, McapReading
+from rampe_guard.recording.backlog import Backlog
+from rampe_guard.recording.bundle import gather
+from rampe_guard.recording.recorded_site import learned_before
+from rampe_guard.recording.recorder import Ended
+from rampe_guard.recording.taps import Clock
+from rampe_guard.recording.writer import METADATA, MODEL, Head
+from rampe_guard.runtime.say import Sayer
+from rampe_guard.runtime.store import model_path
+from rampe_guard.runtime.store_format import encode, header_of
+from rampe_guard.runtime.store_keeper import counted
+from rampe_guard.settings import Site
+from tests.support.messages import HEARTBEAT
+from tests.support.recording_files import entry, small_site, write
+
+
+@pytest.fixture
+def site(tmp_path: Path) -> Site:
+    made = small_site(tmp_path)
+    memory = replace(made.memory, directory=str(tmp_path / "models"))
+    return replace(made, memory=memory, operator="anna")
+
+
+def beginning(site: Site) -> _Beginning:
+    return _Beginning(site, gather(site), Clock(), Sayer("rampe_guard.test"))
+
+
+def test_a_full_backlog_keeps_the_oldest_and_counts_the_rest(site: Site) -> None:
+    entries = [entry(site, k, "joystick", b"x" * 700) for k in range(10)]
+    backlog = Backlog(max_bytes=5 * 1000)
+    backlog.put(entries)
+    assert backlog.first() == entries[:5]
+    assert (len(backlog), backlog.dropped) == (5, 5)
+    backlog.written(2)
+    backlog.put(entries[7:])
+    assert backlog.first() == [*entries[2:5], *entries[7:9]]
+    assert backlog.dropped == 6
+    backlog.give_up()
+    assert (len(backlog), backlog.dropped) == (0, 11)
+
+
+def test_what_came_at_once_is_not_torn_apart(site: Site) -> None:
+    backlog = Backlog()
+    entries = [entry(site, k // 3000, "joystick", b"") for k in range(9000)]
+    backlog.put(entries)
+    sizes = []
+    while batch := backlog.first():
+        sizes.append(len(batch))
+        backlog.written(len(batch))
+    assert sizes == [6000, 3000]
+
+
+def test_the_summary_does_not_hide_a_loss() -> None:
+    files = [Path("a.mcap"), Path("a-0002.mcap"), Path("a-0003.mcap")]
+    assert summary(Ended(10, 0, 2_000_000), files[:1]) == (
+        "10 messages, 2.0 MB in 1 file (a.mcap), none lost"
+    )
+    assert summary(Ended(10, 3, 2_000_000), files).endswith(
+        "in 3 files (a.mcap … a-0003.mcap), 3 messages LOST"
+    )
+
+
+def test_a_guard_with_other_files_is_told_once_and_noted(
+    site: Site, caplog: pytest.LogCaptureFixture
+) -> None:
+    begun = beginning(site)
+    with caplog.at_level(logging.WARNING):
+        for _ in range(3):
+            begun.notice(entry(site, 0.0, "heartbeat", b"{"))
+            begun.notice(entry(site, 0.0, "heartbeat", heartbeat_with(site.content_hash, "cafe")))
+    assert len(caplog.records) == 1
+    assert "works with another scene than" in caplog.text
+    words = begun.head(2).metadata
+    assert words[GUARD]["scene_hash"] == "cafe"
+    assert (words[METADATA]["number"], words[METADATA]["operator"]) == ("2", "anna")
+
+
+def heartbeat_with(config_hash: str, scene_hash: str) -> bytes:
+    hashes = {"config_hash": config_hash, "scene_hash": scene_hash}
+    return wire.encode(msgspec.structs.replace(HEARTBEAT, **hashes))
+
+
+def taught(site: Site) -> tuple[Guard, bytes]:
+    """A guard that has learned a little, and its model as it would be kept."""
+    machine = load_machine(site)
+    guard = machine.guard(0.0, "x")
+    for k in range(4):
+        guard.rampe.observe((1,), np.array([0.1 * k]), np.array([0.5]))
+    header = counted(header_of(site, machine.arm.limits), guard.rampe)
+    return guard, encode(header, dict(guard.rampe.snapshot()))
+
+
+def test_what_was_learned_goes_along_and_is_where_a_replay_begins(
+    site: Site, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert not any(name.startswith(MODEL) for name in beginning(site).head(1).attachments)
+    before, content = taught(site)
+    path = model_path(site)
+    path.parent.mkdir(parents=True)
+    path.write_bytes(content)
+    head = beginning(site).head(1)
+    assert head.attachments[f"{MODEL}anna.npz"] == content
+
+    file = write(site, tmp_path / "a.mcap", [[entry(site, 0.0, "joystick", b"")]], head)
+    machine, reading = load_machine(site), McapReading(file)
+    assert learned_before(reading) == content
+    log = McapLog(site, reading, machine.arm.limits)
+    guard = machine.guard(0.0, "y")
+    _recall(machine, log, guard)
+    assert guard.rampe.categories == before.rampe.categories == {(1,): 4}
+
+    bad = Head(head.metadata, {**head.attachments, f"{MODEL}anna.npz": content[:-40]})
+    file = write(site, tmp_path / "b.mcap", [[entry(site, 0.0, "joystick", b"")]], bad)
+    fresh = machine.guard(0.0, "z")
+    _recall(machine, McapLog(site, McapReading(file), machine.arm.limits), fresh)
+    assert fresh.rampe.categories == {}
+    assert "what was learned before the recording is not used" in capsys.readouterr().err
