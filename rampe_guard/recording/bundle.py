@@ -14,11 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Final
 
-import yourdfpy
-
 from rampe_guard.collision.urdf import _mesh_file as mesh_file
+from rampe_guard.collision.urdf import _parse as read_urdf
 from rampe_guard.core.scene import Mesh
-from rampe_guard.errors import GeometryError, LogError
+from rampe_guard.errors import LogError
 from rampe_guard.settings import Site
 from rampe_guard.settings.source import MAX_MESH_BYTES, parse, read_bytes
 
@@ -139,19 +138,13 @@ def _written(site: Site) -> Iterator[tuple[str, Path]]:
 
 def _urdf_meshes(urdf: str) -> list[tuple[str, Path, Path]]:
     """Per mesh: how the URDF names it, where that is seen from the URDF, and the file."""
-    try:
-        robot = yourdfpy.URDF.load(
-            urdf, load_meshes=False, load_collision_meshes=False, build_scene_graph=False
-        ).robot
-    except Exception as error:  # the reader raises whatever it likes
-        raise GeometryError(f"{urdf}: cannot be read as a URDF: {error}") from error
     found = []
     folder, here = _absolute(urdf).parent, Path(urdf).resolve().parent
-    for link in robot.links:
+    for link in read_urdf(Path(urdf)).links:
         for shape in link.collisions or link.visuals:
             if shape.geometry.mesh is None:
                 continue
-            reference = str(shape.geometry.mesh.filename)
+            reference = shape.geometry.mesh.filename
             file = mesh_file(reference, Path(urdf))
             place = file
             if not Path(reference.removeprefix("file://")).is_absolute():

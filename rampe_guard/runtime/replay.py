@@ -8,11 +8,13 @@ those that a live guard would have made.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from rampe_guard.core.events import Event
-from rampe_guard.core.guard import Guard
 from rampe_guard.core.types import Inputs
+
+if TYPE_CHECKING:  # a recorder needs no guard, and starts the sooner
+    from rampe_guard.core.events import Event
+    from rampe_guard.core.guard import Guard
 
 IDLE_STEP_S = 0.05
 """Period of steps while nothing arrives [s], live and in replay."""
