@@ -116,6 +116,23 @@ class StoppingConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class NextConfig:
+    """The forecast of what follows, from the memory of situations.
+
+    Attributes:
+        enabled: whether memory speaks.
+        horizon_s: how far it looks [s].
+        analogues: how many similar situations are asked.
+        situations: how many are remembered; a day of work is some 200,000.
+    """
+
+    enabled: bool = True
+    horizon_s: float = 2.5
+    analogues: int = 8
+    situations: int = 200_000
+
+
+@dataclass(frozen=True, slots=True)
 class SweepConfig:
     """Tolerance of a contact [m], of a clearance [m], and the budget of clearance queries."""
 
@@ -129,6 +146,8 @@ class AlertConfig:
     """When an alert is raised, held and given back.
 
     Attributes:
+        imminent_probability: smallest probability of contact at which a stopping path that
+            touches is imminent [-]; where it touches whatever the operator does, it always is.
         warning_probability: smallest probability of contact that warns [-].
         caution_probability: smallest probability of contact that is a caution [-].
         debounce_steps: evaluations in a row before a caution or warning is published.
@@ -146,8 +165,9 @@ class AlertConfig:
         shelve_max_s: longest time for which an alert may be shelved [s].
     """
 
-    warning_probability: float = 0.5
-    caution_probability: float = 0.25
+    imminent_probability: float = 0.25
+    warning_probability: float = 0.2
+    caution_probability: float = 0.1
     debounce_steps: int = 2
     imminent_steps: int = 1
     release_steps: int = 5
@@ -196,6 +216,7 @@ class GuardConfig:
     joystick: JoystickConfig = field(default_factory=JoystickConfig)
     rampe: RampeConfig = field(default_factory=RampeConfig)
     stopping: StoppingConfig = field(default_factory=StoppingConfig)
+    next: NextConfig = field(default_factory=NextConfig)
     alerts: AlertConfig = field(default_factory=AlertConfig)
     inputs: InputConfig = field(default_factory=InputConfig)
     axes: int = 0

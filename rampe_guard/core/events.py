@@ -26,6 +26,9 @@ class Evidence:
         time_to_collision_s: [s], None where no time follows.
         sweep: the sweep result behind it; None for system evidence.
         note: extra words (system: the reason).
+        similar: similar situations of the past that were asked (see `foresight`), 0 for none.
+        met: those of them that went on to meet the zone.
+        onward: where the likeliest of these led: displacement from now (n,) [unit], or None.
     """
 
     level: Level
@@ -34,6 +37,9 @@ class Evidence:
     time_to_collision_s: float | None
     sweep: ZoneSweep | None
     note: str = ""
+    similar: int = 0
+    met: int = 0
+    onward: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -44,12 +44,14 @@ class StoppingForecast:
         speed: |v'| (n,) before braking [unit/s].
         coast_s: (n,) time before braking begins [s].
         deceleration: (n,) [unit/s²].
+        lag_s: (n,) time in which the machine does not yet obey [s].
     """
 
     displacement: FloatArray
     speed: FloatArray
     coast_s: FloatArray
     deceleration: FloatArray
+    lag_s: FloatArray
 
     @property
     def stop_s(self) -> float:
@@ -58,9 +60,15 @@ class StoppingForecast:
         total = np.where(moving, self.coast_s + self.speed / self.deceleration, 0.0)
         return float(total.max(initial=0.0))
 
-    def probability_at(self, _fraction: float) -> float:
-        """Certain: it follows from the motion itself."""
-        return 1.0
+    @property
+    def brake_s(self) -> float:
+        """Time [s] that the path takes at the speed before braking if he lets go at once.
+
+        What is met sooner is met whatever he does.
+        """
+        moving = self.speed > 0.0
+        total = np.where(moving, self.lag_s + self.speed / self.deceleration / 2.0, 0.0)
+        return float(total.max(initial=0.0))
 
     def time_at(self, fraction: float) -> float:
         """Time [s] at which ``fraction`` of the path is reached if the operator does not let go.
@@ -150,6 +158,7 @@ class Forecaster:
             speed=np.abs(top),
             coast_s=self._lag_s + reaction,
             deceleration=self._deceleration,
+            lag_s=self._lag_s,
         )
 
     def intent(

@@ -17,6 +17,7 @@ import numpy as np
 
 from rampe_guard.core.alarm import Level
 from rampe_guard.core.annunciator import Annunciator, Moment
+from rampe_guard.core.assessment import Assessor, State, Surroundings
 from rampe_guard.core.config import GuardConfig
 from rampe_guard.core.enabled import EnableKey
 from rampe_guard.core.events import (
@@ -27,28 +28,24 @@ from rampe_guard.core.events import (
     PredictionEvent,
     PredictionSummary,
     RefusalEvent,
-    Source,
     SweepSummary,
 )
-from rampe_guard.core.forecast import Forecast, Forecaster, StoppingForecast
 from rampe_guard.core.inputs import Accepted, Fault, InputGate, Rejection
 from rampe_guard.core.intention import Intention
-from rampe_guard.core.levels import LevelRules, worst
 from rampe_guard.core.monitor import Health, InputMonitor, Status
 from rampe_guard.core.moving import MovingObjects
 from rampe_guard.core.rampe import Rampe
+from rampe_guard.core.risk import ZoneRisk
 from rampe_guard.core.scene import SolidObject
+from rampe_guard.core.situation_memory import SituationMemory
 from rampe_guard.core.types import (
     ActuatorSample,
-    Certificate,
     EnabledSample,
     FloatArray,
     InputName,
     Inputs,
     JoystickSample,
     PathSweeper,
-    Placement,
-    ZoneSweep,
 )
 from rampe_guard.core.velocity import VelocityEstimator
 
@@ -70,6 +67,7 @@ class Snapshot:
     alerts: tuple[AlertEvent, ...]
     prediction: PredictionSummary | None
     sweeps: tuple[SweepSummary, ...]
+    risks: tuple[ZoneRisk, ...] = ()
 
 
 class Guard:
@@ -93,9 +91,6 @@ class Guard:
         boot_id: str = "offline",
         moving: Sequence[SolidObject] = (),
     ) -> None:
-        alerts = config.alerts
-        tail = max(alerts.caution_probability - alerts.deadband_probability, 0.02)
-        self._sweeper = sweeper
         self._gate = InputGate(config.actuators, limits, config.inputs, config.axes)
         self._monitor = InputMonitor(config.inputs, start_s)
         self._enable = EnableKey(config.actuators, config.inputs, start_s)
@@ -103,13 +98,12 @@ class Guard:
         self._moving = MovingObjects(moving, config.inputs)
         self._intention = Intention(config, limits)
         self._velocity = VelocityEstimator(np.array([a.max_velocity for a in config.actuators]))
-        self._forecaster = Forecaster(config.actuators, limits, config.stopping.reaction_s, tail)
-        self._reaction_s = config.stopping.reaction_s
-        self._rules = LevelRules(alerts)
-        self._annunciator = Annunciator(alerts, boot_id)
+        self._assessor = Assessor(config, limits, sweeper)
+        self._annunciator = Annunciator(config.alerts, boot_id)
         self._newest: ActuatorSample | None = None
         self._machine_s = 0.0
         self._sweeps: tuple[SweepSummary, ...] = ()
+        self._risks: tuple[ZoneRisk, ...] = ()
         self._swept_s = start_s
         self._poses_came = False
         self._restarted: str | None = None
@@ -118,6 +112,11 @@ class Guard:
     def rampe(self) -> Rampe:
         """The learned models."""
         return self._intention.rampe
+
+    @property
+    def situations(self) -> SituationMemory:
+        """What is remembered of how situations went on."""
+        return self._assessor.foresight.memory
 
     @property
     def lessons(self) -> dict[str, int]:
@@ -145,10 +144,10 @@ class Guard:
         events += self._annunciator.lapse(moment)
         events += self._annunciator.system(_system_evidence(health, self._restarted), moment)
         if health.off:
-            self._intention.interrupt()
+            self._interrupt()
             events += self._annunciator.switch_off(moment)
         elif health.status is Status.NOT_MONITORING:
-            self._intention.interrupt()
+            self._interrupt()
             events += self._annunciator.freeze(moment)
         elif self._newest is not None and (self._newest is not before or self._must_look(now_s)):
             events += self._evaluate(self._newest, now_s)
@@ -186,6 +185,7 @@ class Guard:
             alerts=tuple(self._annunciator.active(moment)),
             prediction=moment.prediction,
             sweeps=self._sweeps,
+            risks=self._risks,
         )
 
     def _take(self, sample: JoystickSample | ActuatorSample, now_s: float) -> list[Event]:
@@ -211,7 +211,11 @@ class Guard:
         self._newest = moved.sample
         self._velocity.update(moved.sample)
         v = self._velocity.velocity
-        return [*self._intention.actuators(moved.sample, v, now_s, learn=learn)]
+        events = self._intention.actuators(moved.sample, v, now_s, learn=learn)
+        self._assessor.foresight.see(
+            moved.sample.stamp_s, moved.sample.position, v, self._intention.command, learn=learn
+        )
+        return [*events]
 
     def _switch(self, words: tuple[EnabledSample, ...], now_s: float) -> list[RefusalEvent]:
         """Take what the enable key says, and see whether the machine is off now."""
@@ -242,54 +246,33 @@ class Guard:
         if name == "enabled":
             self._enable.refused()
         else:
-            self._intention.interrupt()
+            self._interrupt()
+
+    def _interrupt(self) -> None:
+        self._intention.interrupt()
+        self._assessor.interrupt()
 
     def _restart(self, accepted: Accepted[JoystickSample] | Accepted[ActuatorSample]) -> None:
         if accepted.restarted:
             self._velocity.reset()
             self._intention.reset()
+            self._assessor.interrupt()
 
     def _evaluate(self, newest: ActuatorSample, now_s: float) -> list[Event]:
-        q, v, u = newest.position, self._velocity.velocity, self._intention.command
-        stopping = self._forecaster.stopping(q, v, u)
-        forecasts: list[Forecast] = [stopping]
-        current, known = self._intention.current, self._intention.forecast
-        if current is not None and known is not None:
-            forecasts.append(
-                self._forecaster.intent(q, v, u, current, known, self._intention.under_way())
-            )
-        stop_s = max(stopping.stop_s, self._reaction_s)
-        evidence: dict[str, list[Evidence]] = {}
-        sweeps = []
-        open_zones: frozenset[str] | None = None  # all
-        placed = self._moving.placements(now_s)
+        around = Surroundings(
+            placed=self._moving.placements(now_s),
+            restless=lambda zone: self._moving.restless(zone, now_s),
+            shown=self._annunciator.shown,
+        )
         self._swept_s, self._poses_came = now_s, False
-        for forecast in forecasts:
-            result = self._sweeper.sweep(
-                q, forecast.displacement, clearance=False, only=open_zones, placed=placed
-            )
-            for found_zone in result.zones:
-                zone = found_zone
-                if zone.certificate is Certificate.UNKNOWN and placed.get(zone.zone, True):
-                    self._monitor.sweep_unknown(now_s)  # what is not placed has a reason already
-                if self._moving.restless(zone.zone, now_s):
-                    zone = replace(zone, closing=True)  # whatever the arm does
-                shown = self._annunciator.shown(zone.zone)
-                if shown and self._rules.grazes(zone):
-                    zone = self._surer(q, forecast, zone, placed)
-                found = self._rules.judge(forecast, zone, shown, stop_s)
-                evidence.setdefault(zone.zone, []).append(found)
-                sweeps.append(_summary(forecast, zone))
-            # what is imminent already cannot become more urgent by the next forecast
-            open_zones = frozenset(
-                name
-                for name, all_found in evidence.items()
-                if worst(all_found).level < Level.IMMINENT
-            )
-        self._sweeps = tuple(sweeps)
+        state = State(newest.position, self._velocity.velocity, newest.stamp_s)
+        found = self._assessor.assess(state, self._intention, around)
+        if found.unknown:
+            self._monitor.sweep_unknown(now_s)
+        self._sweeps, self._risks = found.sweeps, found.risks
         moment = self._moment(self._health(now_s), now_s)
-        alerts = self._annunciator.update({z: worst(e) for z, e in evidence.items()}, moment)
-        return [*alerts, *self._intention.update(q, self._sweeps, now_s)]
+        alerts = self._annunciator.update(found.evidence, moment)
+        return [*alerts, *self._intention.update(newest.position, self._sweeps, now_s)]
 
     def _must_look(self, now_s: float) -> bool:
         # a hair less than the period, so that it survives the rounding of ticks
@@ -300,34 +283,6 @@ class Guard:
         more = [*self._enable.weaknesses(now_s), *self._moving.weaknesses(now_s)]
         health = self._monitor.health(now_s, more, off=self._off)
         return replace(health, objects=self._moving.health(now_s)) if self._moving else health
-
-    def _surer(
-        self,
-        q: FloatArray,
-        forecast: Forecast,
-        zone: ZoneSweep,
-        placed: dict[str, Placement | None],
-    ) -> ZoneSweep:
-        """A free zone whose alert is shown: a weak bound must not hold it.
-
-        Asks whether the way keeps clear of the deadband too, which is far quicker to tell than
-        how near it comes.
-        """
-        zones = self._sweeper.sweep(
-            q,
-            forecast.displacement,
-            clearance=False,
-            wider_m=self._rules.alerts.deadband_m,
-            only=frozenset([zone.zone]),
-            placed=placed,
-        ).zones
-        wide = next(found for found in zones if found.zone == zone.zone)
-        closing = wide.closing or self._moving.restless(zone.zone, self._swept_s)
-        now = zone.clearance_now_m if wide.clearance_now_m is None else wide.clearance_now_m
-        zone = replace(zone, closing=closing, clearance_now_m=now)
-        if wide.certificate is Certificate.FREE:
-            zone = replace(zone, clearance_m=wide.clearance_m)
-        return zone
 
     def _moment(self, health: Health, now_s: float) -> Moment:
         newest = self._newest
@@ -349,14 +304,6 @@ def _in_stamp_order(inputs: Inputs) -> list[JoystickSample | ActuatorSample]:
         return sample.stamp_s if np.isfinite(sample.stamp_s) else -np.inf
 
     return sorted(tagged, key=key)  # stable: the joystick stays first
-
-
-def _summary(forecast: Forecast, zone: ZoneSweep) -> SweepSummary:
-    source: Source = "stopping" if isinstance(forecast, StoppingForecast) else "intent"
-    if zone.certificate is Certificate.FREE:
-        return SweepSummary(source, zone, 0.0, None)
-    at = zone.contact_fraction or 0.0
-    return SweepSummary(source, zone, forecast.probability_at(at), forecast.time_at(at))
 
 
 def _system_evidence(health: Health, restarted: str | None) -> Evidence:

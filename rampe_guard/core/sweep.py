@@ -109,8 +109,12 @@ class Sweep:
                 any_path=AnyPath.UNKNOWN if any_path else None,
             )
         zones, lost = self._place(placed or {}, asked, wider_m)
-        groups = self._search(zones, start, displacement, end, clearance=clearance, worst=worst)
-        told = groups.view(np.ndarray).tolist()
+        told: list[Group] = []
+        if any(i in self._solid for i in asked):
+            groups = self._search(zones, start, displacement, end, clearance=clearance, worst=worst)
+            told = groups.view(np.ndarray).tolist()
+        else:
+            problem.scratch.spent[0] = 0
         moving = bool(displacement.any())
         entries = []
         if worst:

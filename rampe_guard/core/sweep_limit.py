@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from rampe_guard.core.types import Certificate, ZoneSweep
@@ -17,11 +18,18 @@ if TYPE_CHECKING:
 def sweep_limit(zone: ActuatorLimit, start: FloatArray, displacement: FloatArray) -> ZoneSweep:
     """Sweep one actuator limit along the whole path."""
     q, x = float(start[zone.actuator]), float(displacement[zone.actuator])
-    now = limit_clearance(zone, q)
-    end = limit_clearance(zone, q + x)
+    up = math.inf if zone.above is None else zone.above - q
+    down = math.inf if zone.below is None else q - zone.below
+    now, end = min(up, down), min(up - x, down + x)
     # the clearance is concave in q (the least of two lines), so its least is at an end
-    fraction = 0.0 if now <= 0.0 else min(_crossings(zone, q, x), default=None)
-    if fraction is None and end <= 0.0:
+    fraction = None
+    if now <= 0.0:
+        fraction = 0.0
+    elif up <= x:
+        fraction = up / x
+    elif down <= -x:
+        fraction = down / -x
+    elif end <= 0.0:
         fraction = 1.0  # a rounding error hid the crossing
     return ZoneSweep(
         zone=zone.name,
@@ -31,7 +39,8 @@ def sweep_limit(zone: ActuatorLimit, start: FloatArray, displacement: FloatArray
         contact_point_m=None,
         clearance_m=max(min(now, end), 0.0),
         clearance_now_m=now,
-        closing=_toward(zone, q, x),
+        # whether the nearer edge comes nearer
+        closing=x > 0.0 if up < down else x < 0.0 if down < up else x != 0.0,
     )
 
 
@@ -43,15 +52,3 @@ def limit_clearance(zone: ActuatorLimit, value: float) -> float:
     if zone.below is not None:
         rooms.append(value - zone.below)
     return min(rooms, default=float("inf"))
-
-
-def _crossings(zone: ActuatorLimit, q: float, x: float) -> list[float]:
-    edges = [edge for edge in (zone.above, zone.below) if edge is not None]
-    return [s for s in ((edge - q) / x for edge in edges if x != 0.0) if 0.0 <= s <= 1.0]
-
-
-def _toward(zone: ActuatorLimit, q: float, x: float) -> bool:
-    """Whether the nearer edge comes nearer."""
-    up = float("inf") if zone.above is None else zone.above - q
-    down = float("inf") if zone.below is None else q - zone.below
-    return x > 0.0 if up < down else x < 0.0 if down < up else x != 0.0

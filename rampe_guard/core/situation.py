@@ -1,0 +1,46 @@
+"""A situation: where the arm is, how it moves, and what the lever commands, as one point.
+
+The coordinates are all in the same measure, so that their distance says how alike two situations
+are. A position counts in seconds of travel at the actuator's top speed, which is the same on a
+bench machine as on a crane; speed and lever count as shares of what there can be.
+
+    (q / (3 s · v_max),  0.12 · v / v_max,  0.3 · u)
+
+The command carries the category (its signs) and how hard it is meant; the lever and the speed
+together carry how far the primitive has come.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from rampe_guard.core.types import FloatArray
+
+TRAVEL_S: Final = 3.0
+"""Positions this far apart at top speed are as unlike as situations get [s]."""
+_SPEED: Final = 0.12
+_LEVER: Final = 0.3
+
+
+class Likeness:
+    """Makes points of situations, for n actuators.
+
+    Args:
+        top: top speeds (n,) [unit/s].
+    """
+
+    def __init__(self, top: FloatArray) -> None:
+        self.travel = TRAVEL_S * top
+        self._top = top
+
+    def point(self, position: FloatArray, velocity: FloatArray, command: FloatArray) -> FloatArray:
+        """The situation's point (3n,), from position, velocity and command (n,) each."""
+        return np.concatenate(
+            (
+                position / self.travel,
+                _SPEED * np.clip(velocity / self._top, -2.0, 2.0),
+                _LEVER * np.clip(command, -1.0, 1.0),
+            )
+        )
