@@ -190,6 +190,17 @@ def test_a_full_disk_gives_the_batch_back_and_the_next_file_begins_with_it(
     assert "was not finished" in McapReading(series.begun[0]).warnings[0]
 
 
+def test_a_file_that_somebody_deletes_is_followed_by_another(site: Site, tmp_path: Path) -> None:
+    series = Series(tmp_path / "a.mcap", channels_of(site), lambda _: NOTHING, NEVER)
+    series.append(frames(site, 5))
+    (tmp_path / "a.mcap").unlink()
+    with pytest.raises(FileNotFoundError, match="was deleted while it was written"):
+        series.append(frames(site, 5, 5))
+    series.append(frames(site, 5, 5))
+    series.finish({})
+    assert all_of([tmp_path / "a-0002.mcap"]) == [e.payload for e in frames(site, 5, 5)]
+
+
 def test_a_file_that_cannot_even_begin_leaves_none(site: Site, tmp_path: Path) -> None:
     series = Series(tmp_path / "no" / "a.mcap", channels_of(site), lambda _: NOTHING, NEVER)
     with pytest.raises(FileNotFoundError):
