@@ -13,6 +13,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
+from mcap.records import Footer
+from mcap.stream_reader import StreamReader
 
 from rampe_guard.errors import LogError
 from rampe_guard.recording.channels import channels_of
@@ -68,6 +70,9 @@ def test_a_foreign_reader_finds_channels_schemas_counts_and_attachments(
         assert roles == {c.role for c in channels_of(site)}
         names = {a.name for a in reader.iter_attachments()}
         assert names == {"files/site.yaml", "files/scene.yaml", "files/slider.urdf"}
+        file.seek(0)
+        records = list(StreamReader(file, validate_crcs=True).records)  # to its last byte
+        assert isinstance(records[-1], Footer)
 
 
 @pytest.fixture(scope="module")
