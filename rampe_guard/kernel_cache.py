@@ -19,8 +19,8 @@ from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
 
-COMPILED = "search_kernel.search-*.nbi"
-"""What numba keeps of the outermost kernel."""
+COMPILED = ("search_kernel.search-*.nbi", "box_kernel.any_way-*.nbi")
+"""What numba keeps of the outermost kernels, those that are called from outside."""
 KERNELS = ("*_kernel.py", "gjk.py", "kernel_data.py", "compiled.py")
 COMPILER = {"numba": "_version.py", "llvmlite": "_version.py", "numpy": "version.py"}
 """Packages that decide what the machine code is, and the file that holds their version: reading
@@ -78,7 +78,7 @@ def forget_old(base: Path) -> None:
 def kept() -> bool:
     """Whether this very package has compiled kernels; else the first sweep takes a minute."""
     folder = _folder()
-    return folder is not None and any(folder.glob(COMPILED))
+    return folder is not None and all(any(folder.glob(name)) for name in COMPILED)
 
 
 @contextmanager

@@ -32,7 +32,7 @@ from rampe_guard.core.events import (
 )
 from rampe_guard.core.inputs import Accepted, Fault, InputGate, Rejection
 from rampe_guard.core.intention import Intention
-from rampe_guard.core.monitor import Health, InputMonitor, Status
+from rampe_guard.core.monitor import Health, InputMonitor, Status, stamp_of
 from rampe_guard.core.moving import MovingObjects
 from rampe_guard.core.rampe import Rampe
 from rampe_guard.core.risk import ZoneRisk
@@ -195,14 +195,14 @@ class Guard:
             if isinstance(lever, Rejection):
                 self._refuse(lever.input, lever.reason, now_s)
                 return [RefusalEvent(lever.input, lever.reason, lever.detail)]
-            self._monitor.accept("joystick", sample.arrival_s)
+            self._monitor.accept("joystick", sample.arrival_s, stamp_of(sample))
             self._restart(lever)
             return [*self._intention.joystick(lever.sample, now_s, learn=learn)]
         moved = self._gate.actuators(sample)
         if isinstance(moved, Rejection):
             self._refuse(moved.input, moved.reason, now_s)
             return [RefusalEvent(moved.input, moved.reason, moved.detail)]
-        self._monitor.accept("actuators", sample.arrival_s)
+        self._monitor.accept("actuators", sample.arrival_s, stamp_of(sample))
         self._moving.follow(sample, restarted=moved.restarted)
         self._enable.moved(sample, restarted=moved.restarted)
         self._restart(moved)

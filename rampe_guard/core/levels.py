@@ -62,9 +62,9 @@ class LevelRules:
         time_s = forecast.time_at(sweep.contact_fraction or 0.0)
         least = self._least(self.alerts.imminent_probability, shown >= Level.IMMINENT)
         known = sweep.certificate is Certificate.CONTACT
-        if known and not risk.floor and not sweep.inside and risk.probability < least:
-            return Evidence(Level.CLEAR, source, risk.probability, time_s, sweep)
-        return Evidence(Level.IMMINENT, source, risk.probability, time_s, sweep)
+        if known and not risk.floor and not sweep.inside and risk.instant < least:
+            return Evidence(Level.CLEAR, source, risk.instant, time_s, sweep)
+        return Evidence(Level.IMMINENT, source, risk.instant, time_s, sweep)
 
     def foreseen(self, sweep: ZoneSweep, risk: ZoneRisk, shown: Level, stop_s: float) -> Evidence:
         """Evidence of what is foreseen about one zone.

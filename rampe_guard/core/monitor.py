@@ -16,7 +16,7 @@ from enum import StrEnum
 
 from rampe_guard.core.config import InputConfig
 from rampe_guard.core.screening import FAULTS
-from rampe_guard.core.types import InputName
+from rampe_guard.core.types import ActuatorSample, InputName, JoystickSample
 
 RECENT_S = 5.0
 """How long a refusal or an unknown sweep keeps the status degraded [s]."""
@@ -74,6 +74,9 @@ class ObjectHealth:
 class Health:
     """Status with its reasons, and the age of the newest good sample of each input [s].
 
+    The age counts from its arrival, and to that how far its stamp lagged behind the other
+    input's.
+
     ``starting``: not monitoring only because the first samples may still be on their way.
     ``off``: not monitoring only because the machine is switched off.
     """
@@ -100,6 +103,8 @@ class InputMonitor:
         self._config = config
         self._start_s = start_s
         self._last_s: dict[InputName, float | None] = {"joystick": None, "actuators": None}
+        self._stamps: dict[InputName, tuple[float, float]] = {}
+        self._lag_s: dict[InputName, float] = {}
         self._accepted: Counter[InputName] = Counter()
         self._rejected: Counter[tuple[InputName, str]] = Counter()
         self._recent: dict[tuple[InputName, str], float] = {}
@@ -110,12 +115,21 @@ class InputMonitor:
         self._faulty: list[str] = []
         self._distrust: str | None = None
 
-    def accept(self, name: InputName, arrival_s: float) -> None:
-        """A good sample arrived."""
+    def accept(self, name: InputName, arrival_s: float, stamp_s: float | None = None) -> None:
+        """A good sample arrived; its own stamp, if it had one, tells how late."""
         self._accepted[name] += 1
-        if name != "enabled":  # which says nothing of where the machine is
-            self._last_s[name] = arrival_s
-            self._note(arrival_s, good=True)
+        if name == "enabled":  # which says nothing of where the machine is
+            return
+        self._last_s[name] = arrival_s
+        self._note(arrival_s, good=True)
+        self._lag_s[name] = 0.0
+        self._stamps.pop(name, None)
+        if stamp_s is not None:
+            self._stamps[name] = stamp_s, arrival_s
+            other = self._stamps.get("joystick" if name == "actuators" else "actuators")
+            if other is not None:  # what its clock shows now, as the other's newest tells
+                clock_s = other[0] + (arrival_s - other[1])
+                self._lag_s[name] = max(0.0, clock_s - stamp_s)
 
     def reject(self, name: InputName, reason: str, now_s: float) -> None:
         """A message was refused."""
@@ -191,7 +205,7 @@ class InputMonitor:
         off: bool = False,
     ) -> Health:
         ages: dict[InputName, float | None] = {
-            name: None if last is None else max(now_s - last, 0.0)
+            name: None if last is None else max(now_s - last, 0.0) + self._lag_s[name]
             for name, last in self._last_s.items()
         }
         counts = dict(self._accepted), dict(self._rejected)
@@ -212,19 +226,35 @@ class InputMonitor:
         if self._joystick_alive is False:
             return Reason("joystick_gone", "joystick", "the joystick's liveliness token is gone")
         if self._config.joystick_on_change:
-            return None
+            last = self._last_s["joystick"]
+            recent = last is not None and now_s - last <= RECENT_S
+            # it may not speak again for long: one that was late does not blind for ever
+            return self._late("joystick", 0.0) if recent else None
         return self._silence("joystick", now_s)
 
     def _silence(self, name: InputName, now_s: float) -> Reason | None:
-        limit = self._config.joystick_timeout_s
-        if name == "actuators":
-            limit = self._config.actuators_timeout_s
-        last = self._last_s[name]
+        limit, last = self._limit_s(name), self._last_s[name]
         if last is None:
             return Reason(f"{name}_silent", name, f"no good {name} message yet")
         if now_s - last <= limit:
-            return None
+            return self._late(name, max(now_s - last, 0.0))
         return Reason(f"{name}_silent", name, f"no good {name} message for more than {limit:g} s")
+
+    def _late(self, name: InputName, since_s: float) -> Reason | None:
+        """Messages keep coming, but they tell of long ago."""
+        lag_s = self._lag_s.get(name, 0.0)
+        if since_s + lag_s <= self._limit_s(name):
+            return None
+        other = "joystick" if name == "actuators" else "actuators"
+        text = (
+            f"{name} messages lag {lag_s:.1f} s behind the {other} by their stamps:"
+            " do both come from one clock?"
+        )
+        return Reason(f"{name}_late", name, text)
+
+    def _limit_s(self, name: InputName) -> float:
+        config = self._config
+        return config.actuators_timeout_s if name == "actuators" else config.joystick_timeout_s
 
     def _weaknesses(self, now_s: float) -> list[Reason]:
         found = []
@@ -249,3 +279,8 @@ class InputMonitor:
             text = "a sweep ran out of its budget and was taken as contact"
             found.append(Reason("sweep_unknown", None, text))
         return found
+
+
+def stamp_of(sample: JoystickSample | ActuatorSample) -> float | None:
+    """When the sender says that it was measured [s]; None where it does not say."""
+    return sample.stamp_s if sample.stamped else None

@@ -10,9 +10,9 @@ What memory says is counted in: of similar situations with weights wᵢ, those t
     P(h) = (2 π(h) + Σ wᵢ [met within h]) / (2 + Σ wᵢ)
 
 So in a new place the present motion speaks alone, and where the operator has been many times,
-what he did there. Both parts of π were measured: of the stopping paths that touch, a third to a
-half end in contact, since operators brake by themselves. P is smoothed over a fifth of a
-second, which is half of what it takes an operator to see that it changed.
+what he did there. Of the stopping paths that touch, a third to a half end in contact, since
+operators brake by themselves. P is smoothed over a fifth of a second, so that alarms do not flicker with
+the choice of situations; the stopping path does not wait for it.
 """
 
 from __future__ import annotations
@@ -65,6 +65,7 @@ class ZoneRisk:
         zone: its name.
         within: P for each of `HORIZONS_S` [-].
         probability: of the longest look ahead, from which the level comes [-].
+        instant: the same, before it is smoothed [-].
         soon: within the time that it takes to react and to stop [-].
         time_s: when, if it comes to contact [s]; None where nothing meets it.
         source: the forecast that says most of it.
@@ -74,6 +75,7 @@ class ZoneRisk:
     zone: str
     within: tuple[float, ...]
     probability: float
+    instant: float
     soon: float
     time_s: float | None
     source: Source
@@ -138,6 +140,7 @@ class RiskBook:
             zone=zone,
             within=tuple(within),
             probability=max(probability, beyond),
+            instant=max(raw[-2], beyond),
             soon=soon,
             time_s=None if math.isinf(time_s) else time_s,
             source="next" if by_memory else "intent",

@@ -4,7 +4,7 @@ The coordinates are all in the same measure, so that their distance says how ali
 are. A position counts in seconds of travel at the actuator's top speed, which is the same on a
 bench machine as on a crane; speed and lever count as shares of what there can be.
 
-    (q / (3 s · v_max),  0.12 · v / v_max,  0.3 · u)
+    (q / (2.5 s · v_max),  0.2 · v / v_max,  0.6 · u)
 
 The command carries the category (its signs) and how hard it is meant; the lever and the speed
 together carry how far the primitive has come.
@@ -18,10 +18,10 @@ import numpy as np
 
 from rampe_guard.core.types import FloatArray
 
-TRAVEL_S: Final = 3.0
+TRAVEL_S: Final = 2.5
 """Positions this far apart at top speed are as unlike as situations get [s]."""
-_SPEED: Final = 0.12
-_LEVER: Final = 0.3
+_SPEED: Final = 0.2
+_LEVER: Final = 0.6
 
 
 class Likeness:

@@ -36,7 +36,7 @@ _GAP_S: Final = 60.0
 """Time of work put where the trace is broken [s]."""
 _BROKEN_S: Final = 1.5
 """Nodes further apart than this are not one motion [s]."""
-_PASS_S: Final = 1.0
+_PASS_S: Final = 2.0
 """Nodes nearer in time than this are of one pass [s]."""
 _SPREAD: Final = 0.2
 """Distance at which a situation counts exp(-1/2)."""

@@ -25,21 +25,29 @@ InputName: TypeAlias = Literal["joystick", "actuators", "enabled"]
 
 @dataclass(frozen=True, slots=True)
 class JoystickSample:
-    """One joystick message: ``axes`` (m,) in [-1, 1]."""
+    """One joystick message: ``axes`` (m,) in [-1, 1].
+
+    Not ``stamped``: the message had no stamp, and ``stamp_s`` is its arrival.
+    """
 
     stamp_s: float
     axes: FloatArray
     arrival_s: float
+    stamped: bool = True
 
 
 @dataclass(frozen=True, slots=True)
 class ActuatorSample:
-    """One actuator message: ``position`` (n,) and, where measured, ``velocity`` (n,)."""
+    """One actuator message: ``position`` (n,) and, where measured, ``velocity`` (n,).
+
+    Not ``stamped``: the message had no stamp, and ``stamp_s`` is its arrival.
+    """
 
     stamp_s: float
     position: FloatArray
     velocity: FloatArray | None
     arrival_s: float
+    stamped: bool = True
 
 
 @dataclass(frozen=True, slots=True)

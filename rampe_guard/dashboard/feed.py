@@ -181,9 +181,8 @@ class Feed:
             items += self._tell(fleets.on_state(self._fleet, self._base, state, now_s, asked_s))
         for beat in line.beats.read(lambda p: wire.decode(p, wire.Heartbeat)):
             items += self._tell(fleets.on_heartbeat(self._fleet, self._base, beat, now_s))
-        for alert in line.alerts.read(lambda p: wire.decode(p, wire.Alert)):
-            self._leads = self._leads.take(alert)
-            items += self._tell(fleets.on_alert(self._fleet, self._base, alert, now_s))
+        for message in line.alerts.drain():
+            items += self._tell(self._alert(message.payload, now_s))
         alive = line.token.poll()
         if alive is not None and alive is not self._token:
             if self._token is not None or alive:  # one that never was there says nothing
@@ -191,6 +190,14 @@ class Feed:
                 items += self._tell(told)
             self._token = alive
         return items
+
+    def _alert(self, payload: bytes, now_s: float) -> Told:
+        try:
+            alert = wire.decode(payload, wire.Alert)
+        except MessageError:  # something is raised, nobody knows what: that is no protection
+            return fleets.on_unreadable(self._fleet, self._base, now_s)
+        self._leads = self._leads.take(alert)
+        return fleets.on_alert(self._fleet, self._base, alert, now_s)
 
     def _tell(self, told: Told) -> tuple[Item, ...]:
         self._fleet, items = told

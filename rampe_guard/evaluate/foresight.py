@@ -38,7 +38,7 @@ from rampe_guard.evaluate.judging import (
 )
 from rampe_guard.evaluate.odds import odds
 from rampe_guard.evaluate.outcome import FALSE, TRUE, UNDECIDED, judge
-from rampe_guard.evaluate.points import Figures, Spread, figures, pool, spread
+from rampe_guard.evaluate.points import Figures, Pool, Spread, figures, pool, spread
 from rampe_guard.evaluate.prediction_report import report as prediction_report
 from rampe_guard.evaluate.stages import judged_zones
 from rampe_guard.evaluate.touch import Touch
@@ -197,7 +197,6 @@ def _forecast(text: str, said: Sequence[Trace], case: _Case) -> form.Forecast:
     # a delay would only harm who says yes or no at once
     how = Manners() if binary and not floor else case.how
     at = point(case.truths, said, case.threshold, how)
-    leads = pooled(case.truths, said, case.threshold, how).lead_s
     columns = range(len(case.truths[0].zones))
     return form.Forecast(
         description=text,
@@ -213,8 +212,12 @@ def _forecast(text: str, said: Sequence[Trace], case: _Case) -> form.Forecast:
         by_zone={
             case.truths[0].zones[z]: _one_zone(z, said, case, how, binary=binary) for z in columns
         },
-        leads_s=tuple(None if np.isnan(lead) else lead for lead in leads.tolist()),
+        leads_s=_leads(pooled(case.truths, said, case.threshold, how)),
     )
+
+
+def _leads(of: Pool) -> tuple[float | None, ...]:
+    return tuple(None if np.isnan(lead) else lead for lead in of.lead_s.tolist())
 
 
 def _one_zone(
@@ -260,7 +263,9 @@ def _published(
             zone: _point(Judged(0.0, figures(found), spread(found)), None)
             for zone, found in pools.items()
         }
-        tables[level.word] = form.LevelTable(total=points.pop(""), zones=points)
+        tables[level.word] = form.LevelTable(
+            total=points.pop(""), zones=points, leads_s=_leads(pools[""])
+        )
     return tables
 
 

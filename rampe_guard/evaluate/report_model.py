@@ -16,6 +16,11 @@ Interval = Annotated[
     Meta(description="95 % bootstrap interval (blocks of half a minute); null: not reckoned."),
 ]
 
+Leads = Annotated[
+    tuple[float | None, ...],
+    Meta(description="Lead time of every crossing, by log, zone and time [s]; null: missed."),
+]
+
 
 class Part(msgspec.Struct, frozen=True, kw_only=True):
     """Base of all parts."""
@@ -88,13 +93,7 @@ class Forecast(Part, frozen=True, kw_only=True):
     ]
     by_log: Annotated[dict[str, Point], Meta(description="The operating point of each judged log.")]
     by_zone: Annotated[dict[str, Point], Meta(description="The operating point of each zone.")]
-    leads_s: Annotated[
-        tuple[float | None, ...],
-        Meta(
-            description="Lead time of every crossing at the operating point, by log, zone and"
-            " time [s]; null: missed."
-        ),
-    ]
+    leads_s: Leads
 
 
 class TradeOff(Part, frozen=True, kw_only=True):
@@ -109,6 +108,7 @@ class LevelTable(Part, frozen=True, kw_only=True):
 
     total: Point
     zones: dict[str, Point]
+    leads_s: Leads
 
 
 class ReliabilityBin(Part, frozen=True, kw_only=True):

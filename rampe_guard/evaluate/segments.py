@@ -23,7 +23,7 @@ from rampe_guard.core.primitive import FinishedPrimitive, PrimitiveTracker
 from rampe_guard.core.start_observer import StartObserver
 from rampe_guard.core.types import ActuatorSample, Category, FloatArray, InputName, JoystickSample
 from rampe_guard.core.velocity import VelocityEstimator
-from rampe_guard.runtime.csv_log import CsvLog
+from rampe_guard.recording import Log
 from rampe_guard.runtime.replay import IDLE_STEP_S
 
 S = TypeVar("S", JoystickSample, ActuatorSample)
@@ -109,7 +109,7 @@ class Run:
     high: FloatArray
 
 
-def cut(config: GuardConfig, limits: FloatArray, log: CsvLog) -> Run:
+def cut(config: GuardConfig, limits: FloatArray, log: Log) -> Run:
     """Cut a log into primitives.
 
     Args:

@@ -29,7 +29,7 @@ from rampe_guard.evaluate.referee import LEAVE_LIMIT, Referee
 from rampe_guard.evaluate.segments import cut
 from rampe_guard.evaluate.touch import Touch
 from rampe_guard.evaluate.walk import Knowledge, Walker
-from rampe_guard.runtime.csv_log import read_csv_log
+from rampe_guard.recording import open_log
 from rampe_guard.settings import load_site
 
 _REACH_SAMPLES = 50
@@ -98,7 +98,7 @@ def judged_zones(machine: Machine) -> tuple[str, ...]:
 def guard_piece(piece: Piece, knowledge: GuardKnowledge | None) -> GuardRun:
     """One log through the guard."""
     machine = machine_of(piece.site)
-    log = read_csv_log(machine.site, piece.log, machine.arm.limits)
+    log = open_log(machine.site, piece.log, machine.arm.limits)
     zones = judged_zones(machine)
     return guard_trace(machine, log, log.first_s, zones, knowledge, learn=piece.learn)
 
@@ -110,7 +110,7 @@ def work_piece(piece: Piece, knowledge: Knowledge | None) -> Work:
         LogError: the guard could not see at any time of it.
     """
     machine = machine_of(piece.site)
-    log = read_csv_log(machine.site, piece.log, machine.arm.limits)
+    log = open_log(machine.site, piece.log, machine.arm.limits)
     touch = Touch(machine.sweeper, judged_zones(machine))
     samples = list(log.positions())
     positions = np.array([q for _, q in samples])
@@ -150,7 +150,7 @@ def prediction_piece(
     """
     machine = machine_of(site)
     config, limits = machine.site.guard, machine.arm.limits
-    runs = [cut(config, limits, read_csv_log(machine.site, log, limits)) for log in logs]
+    runs = [cut(config, limits, open_log(machine.site, log, limits)) for log in logs]
     with threadpool_limits(1):  # the same bits however many cores there are
         return assess(config, limits, runs, fresh=fresh, frozen=frozen)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from rampe_guard.errors import RampeGuardError
+from rampe_guard.evaluate.report_model import report_schema
 from rampe_guard.programs.output import output_folder
 from rampe_guard.settings import scene_schema, site_schema
 from rampe_guard.view.tell import SCHEMA as WATCH_LINE
@@ -30,7 +31,12 @@ def contract_text(name: str | None) -> str:
     """
     if name == ASYNCAPI:
         return asyncapi_text()
-    schemas = {"site": site_schema(), "scene": scene_schema(), **message_schemas()}
+    schemas = {
+        "site": site_schema(),
+        "scene": scene_schema(),
+        "report": report_schema(),
+        **message_schemas(),
+    }
     if name is None:
         return _text(schemas)
     if name not in schemas:

@@ -28,7 +28,7 @@ from rampe_guard.evaluate.stages import machine_of
 from rampe_guard.programs.evaluating_prediction import prediction_summary, prediction_title
 from rampe_guard.programs.fleet_file import read_fleet
 from rampe_guard.programs.output import output_folder
-from rampe_guard.runtime.csv_log import read_csv_log
+from rampe_guard.recording import open_log
 from rampe_guard.runtime.loading import load_telling
 from rampe_guard.settings import load_site
 
@@ -123,7 +123,7 @@ def _check(order: Order) -> None:
     site = load_site(order.site)
     limits = load_arm(site.arm).limits
     for path in order.logs:
-        for warning in read_csv_log(site, path, limits).warnings:
+        for warning in open_log(site, path, limits).warnings:
             print(f"warning: {warning}", file=sys.stderr)  # noqa: T201
 
 

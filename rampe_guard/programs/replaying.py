@@ -19,7 +19,7 @@ from rampe_guard.evaluate.tally import Tally
 from rampe_guard.programs.scoring import closing_table
 from rampe_guard.recording import Log, McapLog, McapReading, is_mcap, open_log
 from rampe_guard.recording.compare import ZoneComparison, changes, compare
-from rampe_guard.recording.recorded_site import learned_before, recorded_site
+from rampe_guard.recording.recorded_site import learned_before, other_files, recorded_site
 from rampe_guard.runtime.loading import load_telling
 from rampe_guard.runtime.messages import Scribe
 from rampe_guard.runtime.replay import replay
@@ -63,6 +63,10 @@ def replay_offline(
         if compare and not isinstance(log, McapLog):
             raise LogError(f"{log_path}: a CSV log has no alerts to compare with")
         tell_warnings(site, log)
+        if site_path is None and isinstance(log, McapLog):
+            for what in other_files(log.reading):
+                text = f"the recorded guard worked with another {what} than is attached"
+                print(f"warning: {log_path}: {text}", file=sys.stderr)  # noqa: T201
         guard = machine.guard(log.first_s, BOOT_ID)
         if isinstance(log, McapLog) and not fresh:
             _recall(machine, log, guard)

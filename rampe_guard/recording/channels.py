@@ -92,6 +92,11 @@ def schema_text(name: str) -> bytes:
     return json.dumps(schema, ensure_ascii=False).encode()
 
 
+def role_of(metadata: Mapping[str, str]) -> str | None:
+    """The role that a channel of a file says that it has; None if it says none."""
+    return metadata.get(_ROLE)
+
+
 @dataclass(frozen=True, slots=True)
 class Heard:
     """A channel of a file as a site understands it: ``exact`` if put on the very key."""
@@ -109,7 +114,7 @@ def understood(site: Site, topic: str, metadata: Mapping[str, str]) -> Heard | N
         metadata: of the same; a file of another recorder has none, and is known by its topics.
     """
     ours = channels_of(site)
-    role = metadata.get(_ROLE)
+    role = role_of(metadata)
     if role is None:
         return next((Heard(c, exact=True) for c in ours if c.key == topic), None)
     key, name = metadata.get(_KEY, topic), metadata.get(_OBJECT, "")

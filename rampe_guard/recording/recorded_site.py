@@ -10,8 +10,10 @@ from pathlib import Path
 
 import msgspec
 
-from rampe_guard.errors import LogError
+from rampe_guard import wire
+from rampe_guard.errors import LogError, MessageError
 from rampe_guard.recording.bundle import Bundle, unpack
+from rampe_guard.recording.channels import role_of
 from rampe_guard.recording.reader import McapReading
 from rampe_guard.recording.writer import FILES, METADATA, MODEL
 from rampe_guard.settings import Site, for_operator, load_site
@@ -47,6 +49,20 @@ def recorded_site(reading: McapReading) -> Iterator[Site]:
 def learned_before(reading: McapReading) -> bytes | None:
     """The model that was kept when the recording began; None if none was."""
     return next(iter(reading.contents(MODEL).values()), None)
+
+
+def other_files(reading: McapReading) -> tuple[str, ...]:
+    """What the recorded guard itself says that it read otherwise than it is attached."""
+    words = reading.metadata.get(METADATA, {})
+    for message in reading.messages():
+        if role_of(message.channel.metadata) != "heartbeat":
+            continue
+        with contextlib.suppress(MessageError):
+            beat = wire.decode(message.payload, wire.Heartbeat)
+            theirs = {"config_hash": beat.config_hash, "scene_hash": beat.scene_hash}
+            names = {"config_hash": "site file or URDF", "scene_hash": "scene"}
+            return tuple(names[key] for key, said in theirs.items() if words.get(key) != said)
+    return ()
 
 
 def absolute_words(bundle: Bundle) -> str:

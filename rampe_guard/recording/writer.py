@@ -8,6 +8,7 @@ is whole up to there, and its reader needs no more.
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -137,6 +138,10 @@ class McapFile:
         Raises:
             OSError: the disk does not take it; the file ends with the last commit.
         """
+        if os.fstat(self._file).st_nlink == 0:  # it would be written for nobody
+            raise FileNotFoundError(
+                errno.ENOENT, "was deleted while it was written", str(self.path)
+            )
         self._mcap.flush()
         self._to_disk()
 
@@ -175,10 +180,10 @@ class McapFile:
             while waiting:
                 waiting = waiting[os.write(self._file, waiting) :]
             os.fsync(self._file)
-        except OSError:
+        except OSError as error:
             with contextlib.suppress(OSError):
                 os.ftruncate(self._file, self._sink.written)
-            raise
+            raise OSError(error.errno, error.strerror, str(self.path)) from None
         self._sink.written += len(self._sink.waiting)
         self._sink.waiting.clear()
 

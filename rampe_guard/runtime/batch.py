@@ -55,7 +55,9 @@ class Batch:
             self._refuse("joystick", message, error)
             return
         stamp_s = self._now_s if decoded.stamp is None else decoded.stamp
-        self._levers.append(JoystickSample(stamp_s, np.array(decoded.axes), self._now_s))
+        stamped = decoded.stamp is not None
+        axes = np.array(decoded.axes)
+        self._levers.append(JoystickSample(stamp_s, axes, self._now_s, stamped=stamped))
 
     def actuators(self, message: Message) -> None:
         """Take what came for the actuators' key."""
@@ -68,7 +70,9 @@ class Batch:
         stamp_s = self._now_s if decoded.stamp is None else decoded.stamp
         velocity = None if decoded.velocity is None else np.array(decoded.velocity)
         position = np.array(decoded.position)
-        self._positions.append(ActuatorSample(stamp_s, position, velocity, self._now_s))
+        stamped = decoded.stamp is not None
+        sample = ActuatorSample(stamp_s, position, velocity, self._now_s, stamped=stamped)
+        self._positions.append(sample)
 
     def enabled(self, message: Message) -> None:
         """Take what came for the enable key."""

@@ -7,6 +7,7 @@ import signal
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 
@@ -23,11 +24,15 @@ from rampe_guard.client import (
     ProtectionLost,
 )
 from rampe_guard.client.items import alert_from
+from rampe_guard.client.machine import MachineState
+from rampe_guard.dashboard.feed import Feed
 from rampe_guard.errors import ConnectionFailedError, SettingsError
+from rampe_guard.runtime.stopping import StopFlag
+from rampe_guard.settings import load_site
 from tests.support import processes
 from tests.support.hearing import EVERYONE, FLEET, Hall, gather, hall, of, shown, speaker
 from tests.support.messages import ALERT
-from tests.support.processes import free_endpoint
+from tests.support.processes import BENCH, free_endpoint, until
 
 pytestmark = pytest.mark.e2e
 
@@ -114,6 +119,33 @@ def test_an_alert_in_words_that_we_do_not_know_is_never_clear(place: Hall, alert
     assert isinstance(lost, ProtectionLost)
     assert "cannot be read" in lost.text
     gather(alerts, of(ProtectionBack))
+
+
+def test_a_dashboard_is_as_suspicious(place: Hall) -> None:
+    site = load_site(BENCH)
+    stop = StopFlag()
+    feed = Feed(
+        replace(
+            site,
+            keys=replace(site.keys, base=FLEET[0]),
+            zenoh=replace(site.zenoh, connect=(place.endpoint,)),
+        ),
+        stop,
+    )
+    feed.start()
+
+    def guard() -> MachineState:
+        return feed.poll(time.monotonic()).guard
+
+    try:
+        until(lambda: guard().protection is Protection.MONITORING, 10.0, "a guard that monitors")
+        place.say(raw='{"schema": "rampe.alert.v2", "level": "doom"}')
+        until(lambda: guard().protection is Protection.UNAVAILABLE, 5.0, "no protection")
+        assert "cannot be read" in guard().reasons[0]
+        until(lambda: guard().protection is Protection.MONITORING, 5.0, "protection again")
+    finally:
+        stop.set()
+        feed.close()
 
 
 def test_not_monitoring_and_a_wedged_guard_are_told(place: Hall, alerts: Alerts) -> None:

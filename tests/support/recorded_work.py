@@ -13,7 +13,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from rampe_guard.settings import Site, load_site
@@ -114,24 +114,26 @@ def _cart(rig: Rig) -> Iterator[Callable[[float], None]]:
 
 @contextlib.contextmanager
 def recorders(folder: Path, site: Path, endpoint: str, *names: str) -> Iterator[list[Process]]:
-    """Recorders into files below ``folder``, all started at once; they record."""
+    """Recorders into files below ``folder``, all started at once; `machine` waits for them."""
     with contextlib.ExitStack() as stack:
         args = ["-m", "rampe_guard", "record", str(site), "--connect", endpoint]
-        started = [
+        yield [
             stack.enter_context(Process(folder, "recorder", [*args, str(folder / name)]))
             for name in names
         ]
-        for process in started:
-            process.wait_for("recording bench-excavator")
-        yield started
 
 
 @contextlib.contextmanager
-def machine(folder: Path, site_path: Path, endpoint: str, site: Site) -> Iterator[Rig]:
-    """A guard and a rig at rest; the guard is ready."""
-    with processes.guard(folder, site_path, endpoint), Rig(endpoint, site, REST) as rig:
-        time.sleep(0.5)
-        yield rig
+def machine(
+    folder: Path, site_path: Path, endpoint: str, site: Site, listening: Sequence[Process]
+) -> Iterator[Rig]:
+    """A guard, recorders that have heard of it, and a rig at rest."""
+    with processes.guard(folder, site_path, endpoint):
+        for process in listening:
+            process.wait_for("recording bench-excavator")
+        with Rig(endpoint, site, REST) as rig:
+            time.sleep(0.5)
+            yield rig
 
 
 def main(out: str) -> None:
@@ -144,7 +146,7 @@ def main(out: str) -> None:
             processes.router(folder, endpoint),
             recorders(folder, site_path, endpoint, "out.mcap") as (recording,),
         ):
-            with machine(folder, site_path, endpoint, load_site(site_path)) as rig:
+            with machine(folder, site_path, endpoint, load_site(site_path), [recording]) as rig:
                 work(rig)
             recording.signal_and_wait(signal.SIGTERM)
             sys.stderr.write(f"{recording.err}{recording.out}\n")

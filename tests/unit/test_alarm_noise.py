@@ -11,11 +11,10 @@ import pytest
 from rampe_guard.core.alarm import Level, State
 from rampe_guard.core.annunciator import Annunciator, Moment
 from rampe_guard.core.config import AlertConfig
-from rampe_guard.core.displacement import DisplacementForecast
 from rampe_guard.core.events import AlertEvent
-from rampe_guard.core.forecast import IntentForecast
 from rampe_guard.core.guard import Guard
 from rampe_guard.core.levels import LevelRules
+from rampe_guard.core.risk import ZoneRisk
 from rampe_guard.core.types import (
     ActuatorSample,
     Certificate,
@@ -76,23 +75,26 @@ def test_two_centimetres_at_a_margin_annunciate_once() -> None:
     assert [e.seq for e in told] == list(range(1, len(told) + 1))
 
 
-def at_time(centre_s: float) -> Callable[[np.random.Generator], tuple[float, float]]:
-    """Fraction 0.4 of a path whose end is reached at a time that jitters [s]."""
-    return lambda rng: (0.4, (centre_s + rng.normal(0.0, 0.3)) / 0.4)
+def at_time(limit_s: float) -> Callable[[np.random.Generator], tuple[float, float]]:
+    """A likely contact whose time jitters about a limit: its odds and its time."""
+    return lambda rng: (0.9, limit_s + rng.normal(0.0, 0.1))
 
 
-def at_chance(fraction: float) -> Callable[[np.random.Generator], tuple[float, float]]:
-    """A contact whose place on the path jitters, so that its odds do."""
-    return lambda rng: (fraction + rng.normal(0.0, 0.03), 6.0)
+def at_chance(level: float) -> Callable[[np.random.Generator], tuple[float, float]]:
+    """A contact in 2 s whose odds jitter about a threshold."""
+    return lambda rng: (float(np.clip(level + rng.normal(0.0, 0.02), 0.0, 1.0)), 2.0)
+
+
+RULES = AlertConfig(warning_probability=0.5, caution_probability=0.25)
 
 
 @pytest.mark.parametrize(
     ("jitter", "levels"),
     [
         (at_time(STOP_S), {Level.WARNING, Level.IMMINENT}),
-        (at_time(AlertConfig().horizon_s), {Level.CAUTION, Level.WARNING}),
-        (at_chance(0.50), {Level.CAUTION, Level.WARNING}),
-        (at_chance(0.57), {Level.CAUTION}),
+        (at_time(RULES.horizon_s), {Level.CAUTION, Level.WARNING}),
+        (at_chance(RULES.warning_probability), {Level.CAUTION, Level.WARNING}),
+        (at_chance(0.27), {Level.CAUTION}),
     ],
     ids=["time to stop", "horizon", "warning odds", "caution odds"],
 )
@@ -100,18 +102,15 @@ def test_a_jittering_forecast_settles_on_its_worst_within_a_second(
     jitter: Callable[[np.random.Generator], tuple[float, float]], levels: set[Level]
 ) -> None:
     rng = np.random.default_rng(3)
-    config = replace(AlertConfig(), realarm_s=120.0)  # so that only noise could tell
+    config = replace(RULES, realarm_s=120.0)  # so that only noise could tell
     rules, annunciator = LevelRules(config), Annunciator(config, "boot")
-    belief = DisplacementForecast(
-        (1,), np.array([1.0]), scale=np.array([0.2]), dof=np.array([9.0]), occurrences=7
-    )
     told: list[AlertEvent] = []
     seen: set[Level] = set()
     for k in range(STEPS // 4):
-        fraction, duration_s = jitter(rng)
-        forecast = IntentForecast(np.array([2.0]), np.array([0.0]), belief, None, duration_s)
-        sweep = ZoneSweep("wall", Certificate.CONTACT, fraction, "arm", None, 0.0, 0.5, True)  # noqa: FBT003
-        found = rules.judge(forecast, sweep, annunciator.shown("wall"), STOP_S)
+        odds, time_s = jitter(rng)
+        risk = ZoneRisk("wall", (odds,) * 3, odds, odds, odds, time_s, "intent", floor=False)
+        sweep = ZoneSweep("wall", Certificate.CONTACT, 0.5, "arm", None, 0.0, 0.5, True)  # noqa: FBT003
+        found = rules.foreseen(sweep, risk, annunciator.shown("wall"), STOP_S)
         seen.add(found.level)
         moment = Moment(k * DT, k * DT, None, None, None)
         told += annunciator.update({"wall": found}, moment)

@@ -12,6 +12,7 @@ import pytest
 
 import rampe_guard as rg
 from rampe_guard import kernel_cache
+from rampe_guard.core.search_kernel import search
 from rampe_guard.kernel_cache import KEPT_FOLDERS, UNUSED_S, forget_old
 
 ROOT = Path(__file__).parents[2]
@@ -51,6 +52,19 @@ def test_the_same_kernels_elsewhere_are_not_compiled_again(copy: Path) -> None:
     site = ROOT / "config" / "sites" / "bench.yaml"
     rg.Sweeper(rg.load_site(site))  # compiled here, if nobody did before
     assert run_in(copy, SWEEP, copy, site) == "1 0"
+
+
+def test_only_all_kernels_are_enough(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else who comes second compiles the last ones beside the first."""
+    rg.Sweeper(rg.load_site(ROOT / "config" / "sites" / "bench.yaml"))
+    folder = Path(str(search.stats.cache_path))  # type: ignore[attr-defined]
+    monkeypatch.setattr(kernel_cache, "_folder", lambda: tmp_path)
+    kept = {path.name.partition("-")[0]: path for path in folder.glob("*.nbi")}
+    assert len(kept) == len(kernel_cache.COMPILED)
+    for path in kept.values():
+        assert not kernel_cache.kept()
+        (tmp_path / path.name).touch()
+    assert kernel_cache.kept()
 
 
 @pytest.mark.parametrize("name", ["gjk.py", "arm_kernel.py", "compiled.py"])

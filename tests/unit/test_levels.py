@@ -1,23 +1,31 @@
+"""Levels of one zone, from what the sweeps proved and how probable contact is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rampe_guard.core.alarm import Level
 from rampe_guard.core.config import AlertConfig
-from rampe_guard.core.displacement import DisplacementForecast
 from rampe_guard.core.events import Evidence
-from rampe_guard.core.forecast import IntentForecast, StoppingForecast
+from rampe_guard.core.forecast import StoppingForecast
 from rampe_guard.core.levels import LevelRules, worst
+from rampe_guard.core.risk import ZoneRisk
 from rampe_guard.core.types import Certificate, ZoneSweep
 
-RULES = LevelRules(AlertConfig())
-STOPPING = StoppingForecast(np.array([1.0]), np.array([1.0]), np.array([0.5]), np.array([1.0]))
+CONFIG = AlertConfig(imminent_probability=0.25, warning_probability=0.5, caution_probability=0.2)
+RULES = LevelRules(CONFIG)
+ONE = np.array([1.0])
+STOPPING = StoppingForecast(ONE, ONE, 0.5 * ONE, ONE, 0.2 * ONE)
 
 
-def intent(duration: float, mean: float = 1.0) -> IntentForecast:
-    belief = DisplacementForecast(
-        (1,), np.array([mean]), scale=np.array([0.2]), dof=np.array([9.0]), occurrences=7
-    )
-    return IntentForecast(np.array([2.0]), np.array([0.0]), belief, None, duration)
+def risk(
+    probability: float = 0.5, time_s: float | None = 0.5, *, soon: float = 0.0, floor: bool = False
+) -> ZoneRisk:
+    same = (probability,) * 3
+    return ZoneRisk("wall", same, probability, probability, soon, time_s, "intent", floor)
 
 
 def zone(
@@ -32,72 +40,90 @@ def zone(
     return ZoneSweep("wall", kind, fraction, "bucket", None, clearance, now, closing)
 
 
-def judge(
-    forecast: IntentForecast | StoppingForecast,
-    sweep: ZoneSweep,
-    shown: Level = Level.CLEAR,
-    stop_s: float = 0.8,
+def stopping(
+    sweep: ZoneSweep, odds: ZoneRisk | None = None, shown: Level = Level.CLEAR
 ) -> Evidence:
-    return RULES.judge(forecast, sweep, shown, stop_s)
+    return RULES.stopping(STOPPING, sweep, odds or risk(), shown)
 
 
-def test_a_free_path_is_clear() -> None:
-    assert judge(STOPPING, zone()).level is Level.CLEAR
-    assert judge(intent(3.0), zone()).level is Level.CLEAR
+def foreseen(
+    sweep: ZoneSweep, odds: ZoneRisk, shown: Level = Level.CLEAR, stop_s: float = 0.8
+) -> Evidence:
+    return RULES.foreseen(sweep, odds, shown, stop_s)
 
 
-def test_a_stopping_path_that_touches_is_imminent_and_certain() -> None:
-    found = judge(STOPPING, zone(0.5))
-    assert (found.level, found.source, found.probability) == (Level.IMMINENT, "stopping", 1.0)
+def test_a_free_path_is_clear_whatever_the_odds() -> None:
+    assert stopping(zone(), risk(0.9)).level is Level.CLEAR
+    assert foreseen(zone(), risk(0.9)).level is Level.CLEAR
+
+
+def test_a_stopping_path_that_touches_is_imminent_and_tells_its_odds() -> None:
+    found = stopping(zone(0.5), risk(0.4))
+    assert (found.level, found.source, found.probability) == (Level.IMMINENT, "stopping", 0.4)
     assert found.time_to_collision_s == pytest.approx(0.5)
 
 
+def test_one_that_the_operator_always_ends_in_time_is_not() -> None:
+    known = risk(0.2)
+    assert stopping(zone(0.5), known).level is Level.CLEAR
+    assert stopping(zone(0.5), known, Level.IMMINENT).level is Level.IMMINENT, "deadband"
+    assert stopping(zone(0.5), replace(known, floor=True)).level is Level.IMMINENT
+    never = LevelRules(replace(CONFIG, imminent_probability=0.0))
+    assert never.stopping(STOPPING, zone(0.5), risk(0.0), Level.CLEAR).level is Level.IMMINENT
+
+
 @pytest.mark.parametrize(
-    ("fraction", "duration", "level"),
+    ("odds", "level"),
     [
-        (0.4, 4.0, Level.WARNING),  # likely, 1.6 s ahead
-        (0.4, 1.5, Level.IMMINENT),  # likely, 0.6 s ahead: too late to stop
-        (0.55, 4.0, Level.CAUTION),  # P about 0.3
-        (0.7, 4.0, Level.CLEAR),  # P about 0.04
-        (0.4, 20.0, Level.CAUTION),  # likely, but beyond the horizon
+        (risk(0.6, 1.6), Level.WARNING),
+        (risk(0.6, 0.6, soon=0.6), Level.IMMINENT),  # too late to stop
+        (risk(0.6, 0.6, soon=0.3), Level.WARNING),  # likely, but hardly so soon
+        (risk(0.3, 1.6), Level.CAUTION),
+        (risk(0.1, 1.6), Level.CLEAR),
+        (risk(0.6, 8.0), Level.CAUTION),  # beyond the horizon
     ],
 )
-def test_intent_levels(fraction: float, duration: float, level: Level) -> None:
-    found = judge(intent(duration), zone(fraction))
+def test_levels_of_what_is_foreseen(odds: ZoneRisk, level: Level) -> None:
+    found = foreseen(zone(0.4), odds)
     assert found.level is level
-    assert found.source == "intent"
+    assert (found.source, found.probability) == ("intent", odds.probability)
 
 
 def test_a_sweep_without_an_answer_is_taken_as_contact() -> None:
     unknown = zone(0.3, certificate=Certificate.UNKNOWN)
-    assert judge(STOPPING, unknown).level is Level.IMMINENT
+    assert stopping(unknown, risk(0.0)).level is Level.IMMINENT
     lost = zone(None, certificate=Certificate.UNKNOWN)
-    assert judge(STOPPING, lost).level is Level.IMMINENT
+    assert stopping(lost, risk(0.0)).level is Level.IMMINENT
 
 
 def test_moving_away_is_never_alarmed_even_from_inside() -> None:
     away = zone(0.0, now=-0.1, closing=False)
-    assert judge(STOPPING, away).level is Level.CLEAR
-    assert judge(intent(1.0), away).level is Level.CLEAR
-    inwards = judge(STOPPING, zone(0.0, now=-0.1))
+    assert stopping(away).level is Level.CLEAR
+    inwards = stopping(zone(0.0, now=-0.1), risk(0.0))
     assert (inwards.level, inwards.source) == (Level.IMMINENT, "contact")
 
 
 def test_a_shown_level_is_kept_a_little_below_its_threshold() -> None:
-    just_below = zone(0.51)  # P about 0.46
-    assert judge(intent(4.0), just_below).level is Level.CAUTION
-    assert judge(intent(4.0), just_below, Level.WARNING).level is Level.WARNING
-    late = intent(2.2)  # 0.88 s for a stop of 0.8 s
-    assert judge(late, zone(0.4)).level is Level.WARNING
-    assert judge(late, zone(0.4), Level.IMMINENT).level is Level.IMMINENT
+    just_below = risk(0.42, 2.0)
+    assert foreseen(zone(0.4), just_below).level is Level.CAUTION
+    assert foreseen(zone(0.4), just_below, Level.WARNING).level is Level.WARNING
+    late = risk(0.6, 0.9, soon=0.6)  # for a stop of 0.8 s
+    assert foreseen(zone(0.4), late).level is Level.WARNING
+    assert foreseen(zone(0.4), late, Level.IMMINENT).level is Level.IMMINENT
+
+
+def test_a_deadband_never_holds_a_level_for_ever() -> None:
+    low = LevelRules(replace(CONFIG, caution_probability=0.05))
+    assert low.foreseen(zone(0.4), risk(0.04), Level.CAUTION, 0.8).level is Level.CAUTION
+    assert low.foreseen(zone(0.4), risk(0.01), Level.CAUTION, 0.8).level is Level.CLEAR
 
 
 def test_grazing_keeps_what_is_shown_but_raises_nothing() -> None:
     grazing = zone(None, clearance=0.01)
-    assert judge(STOPPING, grazing).level is Level.CLEAR
-    assert judge(STOPPING, grazing, Level.WARNING).level is Level.WARNING
-    assert judge(intent(1.0), grazing, Level.IMMINENT).level is Level.WARNING
-    assert judge(STOPPING, zone(None, clearance=0.1), Level.WARNING).level is Level.CLEAR
+    assert stopping(grazing).level is Level.CLEAR
+    assert stopping(grazing, shown=Level.WARNING).level is Level.WARNING
+    assert foreseen(grazing, risk(), Level.IMMINENT).level is Level.WARNING
+    assert stopping(zone(None, clearance=0.1), shown=Level.WARNING).level is Level.CLEAR
 
 
 def test_the_worst_evidence_is_the_most_urgent_then_the_soonest() -> None:

@@ -124,3 +124,57 @@ def test_primitives_that_cannot_be_degrade_until_one_can() -> None:
     assert "no_motion, wrong_actuator" in monitor.health(1.1).reasons[0].text
     monitor.lesson(None)
     assert codes(monitor, 1.1) == []
+
+
+def streams(lag_s: dict[str, float], config: InputConfig | None = None) -> InputMonitor:
+    """Both at 50 Hz for 2 s, stamped by one clock far from ours; one told of what was before."""
+    monitor = InputMonitor(config or InputConfig(), start_s=100.0)
+    for k in range(100):
+        now_s = 100.0 + 0.02 * k
+        monitor.accept("joystick", now_s, 5000.0 + now_s - lag_s.get("joystick", 0.0))
+        monitor.accept("actuators", now_s, 5000.0 + now_s - lag_s.get("actuators", 0.0))
+    return monitor
+
+
+@pytest.mark.parametrize("late", ["joystick", "actuators"])
+def test_an_input_that_keeps_coming_but_tells_of_long_ago_is_not_fresh(late: str) -> None:
+    health = streams({late: 2.5}).health(102.0)
+    assert health.status is Status.NOT_MONITORING
+    (reason,) = health.reasons
+    assert (reason.code, reason.input) == (f"{late}_late", late)
+    assert "lag 2.5 s behind" in reason.text
+    assert health.ages_s[late] == pytest.approx(2.52)  # type: ignore[index]
+
+
+def test_the_age_of_an_input_is_its_arrival_s_and_its_lag() -> None:
+    monitor = streams({"joystick": 0.3}, InputConfig(joystick_timeout_s=0.5))
+    assert monitor.health(102.0).status is Status.OK
+    monitor.accept("actuators", 102.25, 5102.25)
+    assert codes(monitor, 102.25) == ["joystick_late"]  # neither of both alone is too long
+    monitor.accept("actuators", 102.6, 5102.6)
+    assert codes(monitor, 102.6) == ["joystick_silent"]
+
+
+def test_one_that_catches_up_is_believed_at_once() -> None:
+    monitor = streams({"joystick": 2.5})
+    monitor.accept("joystick", 102.0, 5102.0)
+    assert monitor.health(102.0).status is Status.OK
+
+
+@pytest.mark.parametrize("unstamped", ["joystick", "actuators", "both"])
+def test_where_a_message_has_no_stamp_its_arrival_counts(unstamped: str) -> None:
+    monitor = InputMonitor(InputConfig(), start_s=100.0)
+    for now_s in (100.0, 100.1):
+        for name, stamp_s in (("joystick", 1.0), ("actuators", 900.0)):
+            told = None if unstamped in {name, "both"} else stamp_s
+            monitor.accept(name, now_s, told)  # type: ignore[arg-type]
+    assert monitor.health(100.1).status is Status.OK
+
+
+def test_a_late_word_of_an_on_change_joystick_is_told_and_does_not_blind_for_ever() -> None:
+    monitor = InputMonitor(InputConfig(joystick_on_change=True), start_s=100.0)
+    monitor.accept("actuators", 101.0, 101.0)
+    monitor.accept("joystick", 101.0, 98.0)
+    for now_s, expected in ((101.0, ["joystick_late"]), (105.0, ["joystick_late"]), (107.0, [])):
+        monitor.accept("actuators", now_s, now_s)
+        assert codes(monitor, now_s) == expected

@@ -18,7 +18,7 @@ from rampe_guard.programs.replaying import _recall
 from rampe_guard.recording import McapLog, McapReading
 from rampe_guard.recording.backlog import Backlog
 from rampe_guard.recording.bundle import gather
-from rampe_guard.recording.recorded_site import learned_before
+from rampe_guard.recording.recorded_site import learned_before, other_files
 from rampe_guard.recording.recorder import Ended
 from rampe_guard.recording.taps import Clock
 from rampe_guard.recording.writer import METADATA, MODEL, Head
@@ -29,6 +29,8 @@ from rampe_guard.runtime.store_keeper import counted
 from rampe_guard.settings import Site
 from tests.support.messages import HEARTBEAT
 from tests.support.recording_files import entry, small_site, write
+
+_SITE = "site file or URDF"
 
 
 @pytest.fixture
@@ -84,7 +86,7 @@ def test_a_guard_with_other_files_is_told_once_and_noted(
     with caplog.at_level(logging.WARNING):
         for _ in range(3):
             begun.notice(entry(site, 0.0, "heartbeat", b"{"))
-            begun.notice(entry(site, 0.0, "heartbeat", heartbeat_with(site.content_hash, "cafe")))
+            begun.notice(entry(site, 0.0, "heartbeat", beat(site.content_hash, "cafe")))
     assert len(caplog.records) == 1
     assert "works with another scene than" in caplog.text
     words = begun.head(2).metadata
@@ -92,7 +94,16 @@ def test_a_guard_with_other_files_is_told_once_and_noted(
     assert (words[METADATA]["number"], words[METADATA]["operator"]) == ("2", "anna")
 
 
-def heartbeat_with(config_hash: str, scene_hash: str) -> bytes:
+def test_a_recording_tells_if_its_guard_read_other_files(site: Site, tmp_path: Path) -> None:
+    head = beginning(site).head(1)
+    ours = site.content_hash, site.scene.content_hash
+    for hashes, found in ((ours, ()), ((ours[0], "cafe"), ("scene",)), (("", ours[1]), (_SITE,))):
+        beats = [entry(site, 0.0, "heartbeat", b"{"), entry(site, 0.1, "heartbeat", beat(*hashes))]
+        path = tmp_path / f"{len(list(tmp_path.glob('*.mcap')))}.mcap"
+        assert other_files(McapReading(write(site, path, [beats], head))) == found
+
+
+def beat(config_hash: str, scene_hash: str) -> bytes:
     hashes = {"config_hash": config_hash, "scene_hash": scene_hash}
     return wire.encode(msgspec.structs.replace(HEARTBEAT, **hashes))
 

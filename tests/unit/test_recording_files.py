@@ -13,6 +13,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
+from mcap.records import Footer
+from mcap.stream_reader import StreamReader
 
 from rampe_guard.errors import LogError
 from rampe_guard.recording.channels import channels_of
@@ -68,6 +70,9 @@ def test_a_foreign_reader_finds_channels_schemas_counts_and_attachments(
         assert roles == {c.role for c in channels_of(site)}
         names = {a.name for a in reader.iter_attachments()}
         assert names == {"files/site.yaml", "files/scene.yaml", "files/slider.urdf"}
+        file.seek(0)
+        records = list(StreamReader(file, validate_crcs=True).records)  # to its last byte
+        assert isinstance(records[-1], Footer)
 
 
 @pytest.fixture(scope="module")
@@ -188,6 +193,17 @@ def test_a_full_disk_gives_the_batch_back_and_the_next_file_begins_with_it(
     assert [p.name for p in series.begun] == ["a.mcap", "a-0002.mcap"]
     assert all_of(series.begun) == [e.payload for e in (*first, *second)]
     assert "was not finished" in McapReading(series.begun[0]).warnings[0]
+
+
+def test_a_file_that_somebody_deletes_is_followed_by_another(site: Site, tmp_path: Path) -> None:
+    series = Series(tmp_path / "a.mcap", channels_of(site), lambda _: NOTHING, NEVER)
+    series.append(frames(site, 5))
+    (tmp_path / "a.mcap").unlink()
+    with pytest.raises(FileNotFoundError, match="was deleted while it was written"):
+        series.append(frames(site, 5, 5))
+    series.append(frames(site, 5, 5))
+    series.finish({})
+    assert all_of([tmp_path / "a-0002.mcap"]) == [e.payload for e in frames(site, 5, 5)]
 
 
 def test_a_file_that_cannot_even_begin_leaves_none(site: Site, tmp_path: Path) -> None:
