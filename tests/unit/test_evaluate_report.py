@@ -9,9 +9,10 @@ from typing import Any
 import jsonschema  # type: ignore[import-untyped]
 import numpy as np
 import pytest
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from rampe_guard.errors import SettingsError
-from rampe_guard.evaluate.forecasters_learned import GaussianProcessRegressor as Peer
 from rampe_guard.evaluate.forecasters_learned import _Kernel, _mean
 from rampe_guard.evaluate.report_model import report_schema
 from rampe_guard.programs.contract import contract_text
@@ -40,13 +41,11 @@ def test_the_gaussian_process_is_scikit_learns() -> None:
     x[:, 2] = 0.25  # an actuator that always goes as far has no scatter
     at = rng.random(3)
     for kernel in (_Kernel(), _Kernel(2.0, 0.7, 0.05)):
-        fit = Peer(_sklearn(kernel), optimizer=None, normalize_y=True).fit(q, x)
+        fit = GaussianProcessRegressor(_sklearn(kernel), optimizer=None, normalize_y=True).fit(q, x)
         np.testing.assert_allclose(_mean(kernel, q, x, at), fit.predict(at[None])[0], atol=1e-10)
 
 
 def _sklearn(kernel: _Kernel) -> Any:
-    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel  # noqa: PLC0415
-
     return ConstantKernel(kernel.signal) * RBF(kernel.length) + WhiteKernel(kernel.white)
 
 
