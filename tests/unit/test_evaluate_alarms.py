@@ -19,8 +19,14 @@ PERIOD_S = 0.1
 
 def trace(scores: Sequence[float], floors: Sequence[bool] | None = None) -> Trace:
     k = len(scores)
-    floor = np.zeros((k, 1), dtype=np.bool_) if floors is None else np.array(floors, dtype=np.bool_).reshape(k, 1)
-    return Trace(np.arange(k, dtype=np.float64) * PERIOD_S, ("wall",), np.array(scores).reshape(k, 1), floor)
+    floor = (
+        np.zeros((k, 1), dtype=np.bool_)
+        if floors is None
+        else np.array(floors, dtype=np.bool_).reshape(k, 1)
+    )
+    return Trace(
+        np.arange(k, dtype=np.float64) * PERIOD_S, ("wall",), np.array(scores).reshape(k, 1), floor
+    )
 
 
 def slowly(said: Trace, threshold: float, how: Manners) -> list[tuple[float, float]]:
