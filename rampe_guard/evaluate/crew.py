@@ -121,7 +121,7 @@ def evaluate_all(orders: Sequence[Order], crew: Executor, tell: Tell) -> tuple[F
         for order in orders
     ]
     lines: list[_Logs | _Forecasts] = [
-        line for _, guards, works, forecasts in sequences for line in (guards, works, forecasts)
+        line for _, guards, works, forecasts in sequences for line in (forecasts, guards, works)
     ]
     total, done = sum(line.length for line in lines), 0
     tell(0, total)

@@ -12,12 +12,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from threading import get_ident
 
 import numpy as np
 from threadpoolctl import threadpool_limits  # comes with scikit-learn
 
-from rampe_guard.assembly import Machine, load_machine
+from rampe_guard.assembly import Machine
+from rampe_guard.collision import Arm, FclSweeper, load_arm
 from rampe_guard.core.types import FloatArray
 from rampe_guard.errors import LogError
 from rampe_guard.evaluate.baselines import Raw, raw
@@ -78,15 +78,20 @@ class Work:
 
 
 @lru_cache(maxsize=4)
-def _machine(site: str, content: bytes, thread: int) -> Machine:  # noqa: ARG001 - the key
-    return load_machine(load_site(site))
+def _arm(site: str, content: bytes) -> Arm:  # noqa: ARG001 - the key
+    return load_arm(load_site(site).arm)
 
 
 def machine_of(site: str) -> Machine:
-    """The machine of a site file, loaded once in each thread while the files stay as they are."""
-    loaded = load_site(site)  # says in its own words what is wrong with it
-    content = Path(loaded.path).read_bytes() + loaded.scene.content_hash.encode()
-    return _machine(site, content, get_ident())  # a sweeper is for one thread at a time
+    """The machine of a site file; its arm is loaded once while the file stays as it is.
+
+    The sweeper is new each time: what one has swept before shows in the last bits of what it
+    says next, and a piece must give the same wherever it runs.
+    """
+    loaded = load_site(site)
+    arm = _arm(site, Path(loaded.path).read_bytes())
+    sweeper = FclSweeper(arm, loaded.scene, loaded.sweep, loaded.self_collision)
+    return Machine(loaded, arm, sweeper)
 
 
 def judged_zones(machine: Machine) -> tuple[str, ...]:

@@ -25,6 +25,7 @@ _BURST_S = 10.0
 class _Matter:
     wanted: Notice | None = None
     told: Notice | None = None  # the last that may have been heard
+    sure: bool = False  # that was heard
     since_s: float = 0.0
     due_s: float = 0.0
     failures: int = 0
@@ -60,7 +61,7 @@ class Ledger:
             if notice in untold:
                 return untold
             matter = self._matters.setdefault(notice.key, _Matter())
-        if matter.wanted is None and notice.same(matter.told):
+        if matter.wanted is None and matter.sure and notice.same(matter.told):
             return untold
         if matter.wanted is None or notice.level > matter.wanted.level or notice.over:
             matter.due_s, matter.failures = now_s, 0
@@ -76,7 +77,7 @@ class Ledger:
         # what fails again and again must not stand in the way of the rest
         matter = min(due, key=lambda m: (m.failures > 0, -_rank(m), m.since_s))
         self._tokens -= 1.0
-        matter.told = matter.wanted
+        matter.told, matter.sure = matter.wanted, False
         return matter.wanted
 
     def done(self, notice: Notice, now_s: float, *, heard: bool) -> None:
@@ -90,7 +91,7 @@ class Ledger:
             if matter.wanted is notice:  # else the newer one is tried at once
                 matter.due_s = now_s + min(wait_s, _LAST_RETRY_S)
             return
-        matter.failures = 0
+        matter.failures, matter.sure = 0, matter.told is notice
         if matter.wanted is notice:
             matter.wanted = None
             if notice.over:

@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -22,9 +23,16 @@ from rampe_guard.settings.problems import Problems
 from rampe_guard.settings.source import parse, read_bytes
 
 
-class Entry(Model):
-    """One operator on one machine."""
+@dataclass(frozen=True, slots=True)
+class Sequence:
+    """One operator on one machine: absolute paths of the site file and of the logs, in order."""
 
+    name: str
+    site: str
+    logs: tuple[str, ...]
+
+
+class _Entry(Model):
     name: Annotated[
         str,
         Field(
@@ -43,12 +51,12 @@ class Entry(Model):
 
 class _Fleet(Model):
     sequences: Annotated[
-        tuple[Entry, ...],
+        tuple[_Entry, ...],
         Field(min_length=1, description="The operators and their logs.", strict=False),
     ]
 
 
-def read_fleet(path: str) -> tuple[Entry, ...]:
+def read_fleet(path: str) -> tuple[Sequence, ...]:
     """Read the file; paths of the entries are absolute, patterns are resolved.
 
     Raises:
@@ -59,7 +67,7 @@ def read_fleet(path: str) -> tuple[Entry, ...]:
     problems = Problems(document)
     folder = Path(path).absolute().parent
     again = Counter(entry.name for entry in fleet.sequences)
-    found = []
+    found: list[Sequence] = []
     for index, entry in enumerate(fleet.sequences):
         if again[entry.name] > 1:
             problems.add(
@@ -75,7 +83,7 @@ def read_fleet(path: str) -> tuple[Entry, ...]:
                     "give a path relative to this file",
                 )
             logs += matches
-        found.append(Entry(name=entry.name, site=str(folder / entry.site), logs=tuple(logs)))
+        found.append(Sequence(entry.name, str(folder / entry.site), tuple(logs)))
     problems.raise_if_any()
     return tuple(found)
 

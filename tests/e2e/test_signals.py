@@ -47,7 +47,7 @@ def test_ends_while_it_looks_for_a_router(tmp_path: Path, number: signal.Signals
 def test_ends_while_it_loads(tmp_path: Path) -> None:
     args = ["-m", "rampe_guard", "run", str(DEMO)]  # the larger one: it takes seconds
     with Process(tmp_path, "guard", args) as guard:
-        time.sleep(1.0)
+        time.sleep(0.7)
         assert guard.signal_and_wait(signal.SIGTERM) <= END_S
         assert guard.popen.returncode == 0
         assert "zones loaded" not in guard.err, "it had loaded already: this showed nothing"

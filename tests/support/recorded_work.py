@@ -23,6 +23,7 @@ from tests.support.rig import Rig
 from tests.support.station import AT_CRATE, REST, TO_CRATE
 
 CART, ENABLED = "rampe/bench/cart/pose", "rampe/bench/excavator/enabled"
+ALIVE = "rampe/bench/excavator/joystick/alive"
 _FAR_M, _NEAR_M = 1.2, 0.15
 _CART = f"""\
   - {{name: cart, type: sphere, center: [0, 0, 0], radius_m: 0.1, key: {CART}, max_speed: 2}}
@@ -44,6 +45,7 @@ def write_site(folder: Path, *, absolute: bool = False) -> Path:
         ("../scenes/bench.yaml", "../scenes/cart.yaml"),
         ("  base: rampe/bench", f"  enabled: {ENABLED}\n  base: rampe/bench"),
         ("  actuators: {timeout_s: 1.0}", "  actuators: {timeout_s: 0.6}"),
+        ("  joystick: {timeout_s: 1.0}", f"  joystick: {{timeout_s: 1.0, alive_key: {ALIVE}}}"),
     ):
         assert old in text, old
         text = text.replace(old, new)
@@ -53,8 +55,22 @@ def write_site(folder: Path, *, absolute: bool = False) -> Path:
     return path
 
 
-def work(rig: Rig, between: Callable[[], None] = lambda: None) -> None:
-    """Nine seconds: levers, a cart, rubbish, silence and the key; ``between`` in the middle."""
+class Token:
+    """The liveliness token of the joystick: held until `drop`, and again after `hold`."""
+
+    def __init__(self, rig: Rig) -> None:
+        self._session = rig._session
+        self.hold()
+
+    def hold(self) -> None:
+        self._token = self._session.liveliness().declare_token(ALIVE)
+
+    def drop(self) -> None:
+        self._token.undeclare()
+
+
+def work(rig: Rig, token: Token, between: Callable[[], None] = lambda: None) -> None:
+    """Ten seconds: levers, a cart, rubbish, silence, the key; ``between`` in the middle."""
     with _cart(rig) as drive:
         time.sleep(0.4)
         _to_the_crate(rig)
@@ -74,6 +90,10 @@ def work(rig: Rig, between: Callable[[], None] = lambda: None) -> None:
         rig.actuators_on = False
         time.sleep(0.8)
         rig.actuators_on = True
+        time.sleep(1.5)
+        token.drop()
+        time.sleep(0.4)
+        token.hold()
         time.sleep(0.6)
         _to_the_crate(rig)
         time.sleep(0.6)
@@ -126,14 +146,15 @@ def recorders(folder: Path, site: Path, endpoint: str, *names: str) -> Iterator[
 @contextlib.contextmanager
 def machine(
     folder: Path, site_path: Path, endpoint: str, site: Site, listening: Sequence[Process]
-) -> Iterator[Rig]:
-    """A guard, recorders that have heard of it, and a rig at rest."""
+) -> Iterator[tuple[Rig, Token]]:
+    """A guard, recorders beside it, and a rig at rest with its joystick's token."""
     with processes.guard(folder, site_path, endpoint):
         for process in listening:
             process.wait_for("recording bench-excavator")
         with Rig(endpoint, site, REST) as rig:
+            token = Token(rig)
             time.sleep(0.5)
-            yield rig
+            yield rig, token
 
 
 def main(out: str) -> None:
@@ -146,8 +167,8 @@ def main(out: str) -> None:
             processes.router(folder, endpoint),
             recorders(folder, site_path, endpoint, "out.mcap") as (recording,),
         ):
-            with machine(folder, site_path, endpoint, load_site(site_path), [recording]) as rig:
-                work(rig)
+            with machine(folder, site_path, endpoint, load_site(site_path), [recording]) as made:
+                work(*made)
             recording.signal_and_wait(signal.SIGTERM)
             sys.stderr.write(f"{recording.err}{recording.out}\n")
         shutil.copy(folder / "out.mcap", out)

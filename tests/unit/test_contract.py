@@ -93,7 +93,7 @@ def test_writing_takes_away_what_is_no_message_any_more(tmp_path: Path) -> None:
 def test_the_command_prints_each_of_them() -> None:
     assert contract_text("asyncapi") == contract_files()["asyncapi.yaml"]
     assert contract_text("rampe.ack.v1") == contract_files()["rampe.ack.v1.schema.json"]
-    assert set(json.loads(contract_text(None))) == {"site", "scene", *message_schemas()}
+    assert set(json.loads(contract_text(None))) == {"site", "scene", "report", *message_schemas()}
     with pytest.raises(RampeGuardError, match=r"'rampe.ack.v2'; there are .*rampe.ack.v1"):
         contract_text("rampe.ack.v2")
 

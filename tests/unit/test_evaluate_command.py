@@ -5,68 +5,42 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import re
 import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree as ET
 
-import numpy as np
+import jsonschema  # type: ignore[import-untyped]
 import pytest
 
 from rampe_guard.cli import main
+from rampe_guard.evaluate import crew
+from rampe_guard.evaluate.baselines import DESCRIPTIONS
 from rampe_guard.evaluate.prediction import FORECASTERS
-from rampe_guard.settings import LogMapping, load_site
+from rampe_guard.evaluate.prediction_report import report as prediction_report
+from rampe_guard.evaluate.report_model import report_schema
+from rampe_guard.evaluate.stages import prediction_piece
+from rampe_guard.settings import load_site
+from tests.support.bench_log import PERIOD_S, write_log
 from tests.support.processes import BENCH, ROOT
 
+CYCLES = 6
+PRIMITIVES = 4 * CYCLES
+"""Of each log; the last stroke of a log ends with its rest."""
 LOGS = ROOT.parent / "shared" / "data" / "excavator_logs"
-PERIOD_S = 0.05
-REST_S = 0.6
-
-
-def bench_mapping() -> LogMapping:
-    mapping = load_site(BENCH).log
-    assert mapping is not None
-    return mapping
-
-
-def write_log(path: Path, cycles: int, seed: int) -> Path:
-    """An operator who swings to and fro and lifts and lowers, never twice quite alike.
-
-    He aims at places, so that how far he goes follows from where he starts.
-    """
-    rng = np.random.default_rng(seed)
-    mapping = bench_mapping()
-    names = ("swing", "boom", "stick", "bucket")
-    speed = np.array([0.6, 0.02, 0.03, 0.03])
-    q = np.array([0.0, 0.05, 0.07, 0.05])
-    goals = [(0, 0.8, 0.15), (1, 0.08, 0.004), (0, -0.8, 0.15), (1, 0.04, 0.004)]
-    columns = [mapping.joystick[n] for n in names] + [mapping.actuators[n] for n in names]
-    lines = [",".join([mapping.time.column, *(c.column for c in columns)])]
-    t = 0.0
-    for j, goal, spread in goals * cycles:
-        aim = rng.normal(goal, spread)
-        lever = np.zeros(4)
-        lever[j] = np.sign(aim - q[j])
-        moving = round(abs(aim - q[j]) / (speed[j] * PERIOD_S))
-        for u in [lever] * moving + [np.zeros(4)] * round(REST_S / PERIOD_S):
-            q = q + u * speed * PERIOD_S
-            values = zip([*u, *q], columns, strict=True)
-            raw = [(value - c.offset) / c.scale for value, c in values]
-            lines.append(",".join(f"{v:.9g}" for v in (t, *raw)))
-            t += PERIOD_S
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return path
 
 
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     folder = tmp_path_factory.mktemp("logs")
-    return [str(write_log(folder / f"day{k}.csv", 6, seed=k)) for k in (1, 2)]
+    return [str(write_log(folder / f"day{k}.csv", CYCLES, seed=k)) for k in (1, 2)]
 
 
 def evaluated(out: Path, *args: str) -> dict[str, Any]:
-    assert main(["evaluate", str(BENCH), *args, "--out", str(out)]) == 0
+    assert main(["evaluate", str(BENCH), *args, "--out", str(out), "--jobs", "1"]) == 0
     found: dict[str, Any] = json.loads((out / "prediction.json").read_text("utf-8"))
     assert (out / "prediction.png").read_bytes().startswith(b"\x89PNG")
     return found
@@ -77,8 +51,17 @@ class Told:
     """What an evaluation wrote and showed."""
 
     found: dict[str, Any]
-    content: bytes
+    report: dict[str, Any]
+    page: str
     shown: str
+
+
+def of_prediction(
+    logs: list[str], *, fresh: bool = False, frozen: int | None = None
+) -> dict[str, Any]:
+    """The prediction part alone."""
+    found = prediction_piece(str(BENCH), tuple(logs), fresh, frozen)
+    return prediction_report(found, load_site(BENCH))
 
 
 @pytest.fixture(scope="module")
@@ -87,16 +70,16 @@ def told(logs: list[str], tmp_path_factory: pytest.TempPathFactory) -> Told:
     out = tmp_path_factory.mktemp("out") / "new" / "folder"
     with contextlib.redirect_stdout(io.StringIO()) as shown:
         found = evaluated(out, *logs)
-    return Told(found, (out / "prediction.json").read_bytes(), shown.getvalue())
+    report = json.loads((out / "report.json").read_text("utf-8"))
+    return Told(found, report, (out / "report.html").read_text("utf-8"), shown.getvalue())
 
 
 def test_a_log_is_evaluated(told: Told) -> None:
     found, shown = told.found, told.shown
     assert [run["log"] for run in found["logs"]] == ["day1.csv", "day2.csv"]
-    # the last stroke of a log ends with its rest
-    assert [run["primitives"] for run in found["logs"]] == [24, 24]
-    assert found["total"]["primitives"] == 48
-    assert found["total"]["primitives_known"] == 48 - 4 * 5
+    assert [run["primitives"] for run in found["logs"]] == [PRIMITIVES] * 2
+    assert found["total"]["primitives"] == 2 * PRIMITIVES
+    assert found["total"]["primitives_known"] == 2 * PRIMITIVES - 4 * 5
     assert found["range"]["stick"] == {"width": 1.0, "unit": "m"}  # it never moved
     assert 1.6 < found["range"]["swing"]["width"] < 2.6
 
@@ -122,23 +105,67 @@ def test_a_log_is_evaluated(told: Told) -> None:
     reliability = calibration["reliability"]["overall"]
     assert sum(b["count"] for b in reliability["bins"]) == reliability["answers"] > 0
     assert 0.0 <= reliability["expected_calibration_error"] <= 1.0
-    assert "folder" not in told.content.decode()  # nor any other path of this machine
+    assert "folder" not in json.dumps(told.report)  # nor any other path of this machine
     assert {"rampe-guard", "river", "scikit-learn"} <= found["versions"].keys()
 
 
-def test_the_same_logs_give_the_same_bytes(tmp_path: Path) -> None:
-    log = str(write_log(tmp_path / "short.csv", 2, seed=5))
-    for out in ("a", "b"):
-        evaluated(tmp_path / out, log)
-    first, again = ((tmp_path / out / "prediction.json").read_bytes() for out in ("a", "b"))
-    assert first == again
+def test_the_report_tells_how_early_and_how_often_in_vain(told: Told) -> None:
+    report = told.report
+    jsonschema.validate(report, report_schema())
+    assert report["zones"] == ["crate", "ceiling", "slew-left", "slew-right"]
+    assert [log["log"] for log in report["logs"]] == ["day1.csv", "day2.csv"]
+    assert list(report["forecasts"]) == ["guard", *DESCRIPTIONS]
+    lines = [zone for log in report["logs"] for zone in log["zones"].values()]
+    crossings = sum(len(line["contacts"]) for line in lines)
+    assert report["crossings"] == crossings > 10  # none was there when a log began
+    for name, forecast in report["forecasts"].items():
+        at = forecast["operating_point"]
+        assert at["crossings"] == crossings
+        assert at["alarms"] >= at["false_alarms"] + at["undecided"]
+        assert at["warned_0_5_s"] >= at["warned_1_0_s"] >= at["warned_1_5_s"] >= at["warned_2_0_s"]
+        low, high = at["intervals"]["warned_1_0_s"]
+        assert low <= at["warned_1_0_s"] <= high
+        assert sum(point["crossings"] for point in forecast["by_zone"].values()) == crossings
+        assert sum(point["missed"] for point in forecast["by_log"].values()) == at["missed"]
+        assert sum(lead is None for lead in forecast["leads_s"]) == at["missed"]
+        assert forecast["binary"] == (name not in {"guard", "rampe_primitive"})
+    guard = report["forecasts"]["guard"]
+    thresholds = [point["threshold"] for point in guard["curve"]]
+    assert len(thresholds) >= 60
+    assert report["warning_probability"] in thresholds
+    at = guard["operating_point"]
+    same = guard["curve"][thresholds.index(report["warning_probability"])]
+    assert {**same, "intervals": None} == {**at, "intervals": None}
+    rates = [point["false_per_min_per_zone"] for point in guard["curve"]]
+    assert rates[0] >= rates[-1]
+    verdicts = [verdict for line in lines for *_, verdict in line["alarms"]]
+    assert verdicts.count("false") == at["false_alarms"]
+    # the floor is the stopping forecast, and nobody is warned later by more
+    floor = report["forecasts"]["stopping"]["operating_point"]
+    assert at["warned_0_5_s"] >= floor["warned_0_5_s"]
+    published = report["published"]
+    assert published["caution"]["total"]["missed"] <= published["imminent"]["total"]["missed"]
+    rms = report["prediction"]
+    assert rms["rampe"]["rms"] < rms["mean"]["rms"] < rms["zero"]["rms"]
+    assert report["prediction_details"] == told.found
 
 
-def test_fresh_means_that_a_log_knows_nothing_of_those_before(
-    told: Told, logs: list[str], tmp_path: Path
-) -> None:
-    fresh, carried = evaluated(tmp_path, *logs, "--fresh"), told.found
-    assert fresh["total"]["primitives_known"] == 48 - 2 * 4 * 5
+def test_the_page_needs_nothing_from_outside(told: Told) -> None:
+    page = told.page
+    assert page.startswith("<!doctype html>")
+    assert not re.findall(r"(?:src|href|url)\s*[=(]|https?://|@import", page)
+    at = told.report["forecasts"]["guard"]["operating_point"]
+    assert f"<b>{at['warned_1_0_s']:.0%}</b> of {at['crossings']} crossings" in page
+    for svg in re.findall(r"<svg.*?</svg>", page, re.DOTALL):
+        assert "nan" not in svg
+        ET.fromstring(svg)  # noqa: S314 - our own
+    assert page.count("<svg") > 8
+
+
+def test_fresh_means_that_a_log_knows_nothing_of_those_before(told: Told, logs: list[str]) -> None:
+    fresh = of_prediction(logs, fresh=True)
+    carried = told.found
+    assert fresh["total"]["primitives_known"] == 2 * (PRIMITIVES - 4 * 5)
     assert fresh["logs"][0] == carried["logs"][0]  # the first knows nothing either way
     before, after = (found["logs"][1]["all"] for found in (fresh, carried))
     assert before["zero"] == after["zero"]
@@ -146,14 +173,49 @@ def test_fresh_means_that_a_log_knows_nothing_of_those_before(
         assert before[name]["answered"] < after[name]["answered"] == 1.0
 
 
+def test_frozen_means_that_only_the_first_logs_teach(told: Told, logs: list[str]) -> None:
+    frozen = of_prediction(logs, frozen=1)
+    assert frozen["total"]["primitives"] == PRIMITIVES  # of the second alone
+    again = of_prediction([logs[0], logs[1], logs[1]], frozen=1)
+    first, second = (log["all"] for log in again["logs"][1:])
+    assert first == second == frozen["logs"][1]["all"]  # nothing was learned in between
+    learned = told.found["logs"][1]["all"]
+    assert frozen["logs"][1]["all"]["zero"] == learned["zero"]
+    assert frozen["logs"][1]["all"]["RAMPE"] != learned["RAMPE"]
+
+
 def test_a_short_log_has_no_known_categories_and_is_no_error(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    found = evaluated(tmp_path, str(write_log(tmp_path / "short.csv", 2, seed=3)))
+    found = evaluated(tmp_path, str(write_log(tmp_path / "short.csv", 1, seed=3)))
     assert found["total"]["known"] == {}
     assert found["ratios"]["known"] == {}
     assert found["calibration"]["known"]["coverage"][0]["overall"] is None
     assert "—" in capsys.readouterr().out
+    jsonschema.validate(json.loads((tmp_path / "report.json").read_text("utf-8")), report_schema())
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--frozen", "2"], "leaves none of 2 logs"),
+        (["--frozen", "1", "--fresh"], "choose one"),
+        (["--fleet", "fleet.yaml"], "either SITE and LOG, or --fleet"),
+        (["--scheduler", "tcp://127.0.0.1:9", "--jobs", "1"], "no Dask scheduler answers"),
+    ],
+)
+def test_what_cannot_be_is_said_at_once(
+    options: list[str],
+    words: str,
+    logs: list[str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(crew, "_PATIENCE_S", 0.5)
+    assert main(["evaluate", str(BENCH), *logs, *options, "--out", str(tmp_path / "out")]) == 2
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_log_without_a_stroke_is_refused(
@@ -203,12 +265,11 @@ def test_a_missing_extra_is_named(library: str, logs: list[str], tmp_path: Path)
 @pytest.mark.skipif(not LOGS.is_dir(), reason="no private logs at ../shared/data")
 def test_a_persons_recorded_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     lines = (LOGS / "operator3_run1.csv").read_text("utf-8").splitlines(keepends=True)
-    (tmp_path / "end.csv").write_text(lines[0] + "".join(lines[-2500:]), "utf-8")
+    (tmp_path / "end.csv").write_text(lines[0] + "".join(lines[-1500:]), "utf-8")
     found = evaluated(tmp_path, str(tmp_path / "end.csv"))
     assert "row left out" in capsys.readouterr().err  # the log ends in half a row
-    known = found["total"]["known"]
-    assert known["running mean"]["error"] < known["zero"]["error"]
-    assert known["RAMPE"]["error"] < known["running mean"]["error"]
+    errors = found["total"]["all"]
+    assert errors["RAMPE"]["error"] < errors["zero"]["error"]
     trap = str(LOGS / "trap_columns_swapped.csv")
     assert main(["evaluate", str(BENCH), trap, "--out", str(tmp_path / "trap")]) == 2
     assert "swapped" in capsys.readouterr().err

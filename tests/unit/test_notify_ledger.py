@@ -113,6 +113,17 @@ def test_lost_protection_takes_back_what_is_no_longer_current() -> None:
     assert sorted(drained(ledger, 1.0)) == [("protection", True), ("waits", False)]
 
 
+def test_what_failed_before_protection_was_lost_is_told_when_it_is_back() -> None:
+    ledger = Ledger(OFTEN)
+    ledger.offer(raised := note("a"), 0.0)
+    assert ledger.next(0.0) is raised
+    ledger.done(raised, 0.1, heard=False)
+    ledger.offer(note("protection"), 0.2)
+    ledger.offer(end("protection"), 0.3)
+    ledger.offer(raised, 0.3)
+    assert ("a", False) in drained(ledger, 1.0)
+
+
 def test_a_target_is_not_told_more_than_its_rate() -> None:
     ledger = Ledger(per_minute=60.0)
     for i in range(40):
