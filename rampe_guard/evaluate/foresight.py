@@ -24,9 +24,11 @@ from rampe_guard.evaluate.baselines import (
     traces,
 )
 from rampe_guard.evaluate.crew import Findings
+from rampe_guard.evaluate.definitions import DEFINITIONS, GUARD, GUARDS, SPARING
 from rampe_guard.evaluate.episodes import alert_episodes, spans_from_transitions
 from rampe_guard.evaluate.foretold import foretold
 from rampe_guard.evaluate.judging import (
+    THRESHOLDS,
     Judged,
     Truth,
     curve,
@@ -34,7 +36,6 @@ from rampe_guard.evaluate.judging import (
     point,
     pooled,
     truth,
-    with_intervals,
 )
 from rampe_guard.evaluate.odds import odds
 from rampe_guard.evaluate.outcome import FALSE, TRUE, UNDECIDED, judge
@@ -44,7 +45,9 @@ from rampe_guard.evaluate.stages import judged_zones
 from rampe_guard.evaluate.touch import Touch
 from rampe_guard.evaluate.trace import Manners, Trace, manners
 
-GUARD: Final = "guard"
+TOLD: Final = 0.02
+"""Probability from which an answer tells of a contact [-]."""
+_HALF: Final = 0.5
 _VERDICTS = {TRUE: "true", FALSE: "false", UNDECIDED: "undecided"}
 _LIBRARIES = ("numpy", "scipy", "scikit-learn", "river")
 _SLUGS = {
@@ -54,40 +57,6 @@ _SLUGS = {
     "5 nearest neighbours": "nearest_neighbours_5",
     "Gaussian process, optimised": "gaussian_process_optimised",
     "RLS of river": "rls_of_river",
-}
-
-DEFINITIONS: Final = {
-    "crossing": (
-        "the arm's true motion, swept between samples with the guard's certificates, enters a"
-        " zone; a re-entry within 0.5 s of leaving is the same crossing"
-    ),
-    "alarm": (
-        "from the first evaluation at which a forecaster's cause is confirmed to its last cause,"
-        " joined across silence of up to 0.5 s; the guard's alarms need as many evaluations in a"
-        " row as the site's alerts say, those of a yes-or-no baseline only one"
-    ),
-    "warned_x_s": (
-        "share of all crossings whose alarm began at least x s before, and was on at the entry or"
-        " had ended at most 0.5 s before"
-    ),
-    "missed": "crossings without such an alarm",
-    "false_per_min_per_zone": "alarms with no crossing in them or within 0.5 s after",
-    "alarmed_share": "share of the time outside contact, over all zones, that an alarm was on",
-    "lead": (
-        "entry less the start of its alarm, or less the end of the crossing before it within the"
-        " same alarm; medians and quantiles are of warned crossings"
-    ),
-    "operating_point": "at the site's warning probability",
-    "published": (
-        "the same of the guard's own alerts at a level or above, from rise to clear, with all its"
-        " delays and deadbands"
-    ),
-    "interval": "2.5 % and 97.5 % of 1000 bootstrap samples of blocks of half a minute (seeded)",
-    "reliability": (
-        "at every evaluation, of every zone that the arm is not in, and where the log goes on for"
-        " the horizon: the probability said, against whether the arm entered within the horizon"
-    ),
-    "rms": "root mean square error of the next displacement, in shares of the range",
 }
 
 
@@ -116,7 +85,12 @@ def report(found: Findings, machine: Machine) -> form.Report:
     case = _Case(truths, alerts.warning_probability, manners(alerts))
     unit = _units(found, machine, zones)
     by_log = [traces(w.raw, unit) for w in works]
-    forecasts = {GUARD: _forecast("the guard itself", [g.trace for g in guards], case)}
+    said = [g.trace for g in guards]
+    sparing = [replace(g.trace, floor=g.certain) for g in guards]
+    forecasts = {
+        GUARD: _forecast(GUARDS[GUARD], said, case),
+        SPARING: _forecast(GUARDS[SPARING], sparing, case),
+    }
     for name, text in DESCRIPTIONS.items():
         forecasts[name] = _forecast(text, [made[name] for made in by_log], case)
     details = prediction_report(found.prediction, site)
@@ -143,17 +117,17 @@ def report(found: Findings, machine: Machine) -> form.Report:
                 "horizon_s",
                 FAMILY_S,
                 lambda h: [constant_velocity(w.raw, h) for w in works],
-                truths,
+                case,
             ),
             "proximity": _trade_off(
                 "share of the actuator's range, or of the arm's reach",
                 FAMILY_NEAR,
                 lambda near: [proximity(w.raw, near, unit) for w in works],
-                truths,
+                case,
             ),
         },
         published=_published(truths, [g.transitions for g in guards]),
-        reliability=_reliability(truths, [g.trace for g in guards]),
+        reliability=_reliability(truths, said),
         prediction=_prediction(details),
         prediction_details=details,
         logs=tuple(
@@ -193,26 +167,29 @@ def _units(found: Findings, machine: Machine, zones: tuple[str, ...]) -> FloatAr
 
 def _forecast(text: str, said: Sequence[Trace], case: _Case) -> form.Forecast:
     binary = all(trace.binary for trace in said)
-    floor = any(trace.floor.any() for trace in said)
-    # a delay would only harm who says yes or no at once
-    how = Manners() if binary and not floor else case.how
-    at = point(case.truths, said, case.threshold, how)
+    how = case.how
+    # of yes and no, any threshold between them says the same
+    least = _HALF if binary else case.threshold
+    at = point(case.truths, said, least, how)
     columns = range(len(case.truths[0].zones))
     return form.Forecast(
         description=text,
         binary=binary,
         curve=(_point(at, None),)
         if binary
-        else tuple(_point(j, j.threshold) for j in curve(case.truths, said, how)),
+        else tuple(
+            _point(j, j.threshold)
+            for j in curve(case.truths, THRESHOLDS, lambda threshold: (said, threshold), how)
+        ),
         operating_point=_point(at, None if binary else case.threshold),
         by_log={
-            t.name: _point(point([t], [s], case.threshold, how), None if binary else case.threshold)
+            t.name: _point(point([t], [s], least, how), None if binary else least)
             for t, s in zip(case.truths, said, strict=True)
         },
         by_zone={
-            case.truths[0].zones[z]: _one_zone(z, said, case, how, binary=binary) for z in columns
+            case.truths[0].zones[z]: _one_zone(z, said, case, least, binary=binary) for z in columns
         },
-        leads_s=_leads(pooled(case.truths, said, case.threshold, how)),
+        leads_s=_leads(pooled(case.truths, said, least, how)),
     )
 
 
@@ -221,25 +198,22 @@ def _leads(of: Pool) -> tuple[float | None, ...]:
 
 
 def _one_zone(
-    z: int, said: Sequence[Trace], case: _Case, how: Manners, *, binary: bool
+    z: int, said: Sequence[Trace], case: _Case, least: float, *, binary: bool
 ) -> form.Point:
     alone = [replace(t, zones=(t.zones[z],), contacts=(t.contacts[z],)) for t in case.truths]
     heard = [Trace(s.time_s, (s.zones[z],), s.score[:, [z]], s.floor[:, [z]]) for s in said]
-    at = point(alone, heard, case.threshold, how)
-    return _point(at, None if binary else case.threshold)
+    at = point(alone, heard, least, case.how)
+    return _point(at, None if binary else least)
 
 
 def _trade_off(
     parameter: str,
     values: Sequence[float],
     make: Callable[[float], Sequence[Trace]],
-    truths: Sequence[Truth],
+    case: _Case,
 ) -> form.TradeOff:
-    pools = [pooled(truths, make(value), 0.5, Manners()) for value in values]
-    return form.TradeOff(
-        parameter=parameter,
-        curve=tuple(_point(j, j.threshold) for j in with_intervals(values, pools)),
-    )
+    judged = curve(case.truths, values, lambda value: (make(value), _HALF), case.how)
+    return form.TradeOff(parameter=parameter, curve=tuple(_point(j, j.threshold) for j in judged))
 
 
 def _published(
@@ -260,7 +234,7 @@ def _published(
         for z, zone in enumerate(truths[0].zones):
             pools[zone] = pool((log[z],) for log in judged)
         points = {
-            zone: _point(Judged(0.0, figures(found), spread(found)), None)
+            zone: _point(Judged(0.0, figures(found), None, spread(found)), None)
             for zone, found in pools.items()
         }
         tables[level.word] = form.LevelTable(
@@ -272,13 +246,18 @@ def _published(
 def _reliability(truths: Sequence[Truth], said: Sequence[Trace]) -> tuple[form.ReliabilityOf, ...]:
     tables = []
     for index, horizon_s in enumerate(said[0].horizons_s):
-        found = odds(*foretold(truths, said, index))
+        answers = foretold(truths, said, index)
+        found = odds(*answers)
+        told = answers[0] >= TOLD
+        of_told = odds(answers[0][told], answers[1][told], answers[2][told])
         tables.append(
             form.ReliabilityOf(
                 horizon_s=horizon_s,
                 answers=found.answers,
                 calibration_error=found.error,
                 calibration_error_interval=found.spread,
+                answers_told=of_told.answers,
+                calibration_error_told=of_told.error,
                 bins=tuple(
                     form.ReliabilityBin(
                         said=b.said,
@@ -340,7 +319,21 @@ def _point(judged: Judged, threshold: float | None) -> form.Point:
         false_alarms=found.false_alarms,
         undecided=found.undecided,
         zone_minutes=found.zone_minutes,
+        strict=None if judged.strict is None else _strict(judged.strict),
         intervals=None if judged.spread is None else _intervals(judged.spread),
+    )
+
+
+def _strict(found: Figures) -> form.Strict:
+    return form.Strict(
+        false_per_min_per_zone=found.false_per_min_per_zone,
+        alarmed_share=found.alarmed_share,
+        warned_0_5_s=found.warned[0],
+        warned_1_0_s=found.warned[1],
+        warned_1_5_s=found.warned[2],
+        warned_2_0_s=found.warned[3],
+        median_lead_s=found.median_lead_s,
+        missed=found.missed,
     )
 
 

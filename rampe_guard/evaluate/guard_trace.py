@@ -1,6 +1,7 @@
 """The guard itself on recorded work: what it said of each zone, and the alerts it published.
 
-The floor is the stopping forecast, the score the probability of the intent forecast.
+The score is its probability of contact, the floor what it calls imminent by the stopping path
+alone, whatever the site's warning probability.
 """
 
 from __future__ import annotations
@@ -12,14 +13,16 @@ import numpy as np
 from rampe_guard.assembly import Machine
 from rampe_guard.core.alarm import Level
 from rampe_guard.core.arrays import Arrays
-from rampe_guard.core.events import SYSTEM_ZONE, AlertEvent
+from rampe_guard.core.config import AlertConfig
+from rampe_guard.core.events import SYSTEM_ZONE, AlertEvent, SweepSummary
 from rampe_guard.core.guard import Guard
+from rampe_guard.core.risk import HORIZONS_S, ZoneRisk
 from rampe_guard.core.types import Certificate
-from rampe_guard.evaluate.trace import Trace
+from rampe_guard.evaluate.trace import Mask, Trace, lowered
 from rampe_guard.runtime.replay import Steps
 
 Knowledge = Arrays
-"""What a guard learned of an operator; it can be sent to another process."""
+"""What a guard learned of an operator, models and situations; it can be sent to another process."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,11 +31,14 @@ class GuardRun:
 
     Attributes:
         trace: what it said at each evaluation.
+        certain: what of its floor holds whatever the site's settings (k, z): the arm will touch
+            whatever the operator does, is inside, or nothing is known.
         transitions: its published alerts: time [s], zone, level; in order.
         knowledge: what it knows in the end.
     """
 
     trace: Trace
+    certain: Mask
     transitions: tuple[tuple[float, str, Level], ...]
     knowledge: Knowledge
 
@@ -59,52 +65,111 @@ def guard_trace(
     guard = machine.guard(first_s, "evaluate")
     if knowledge is not None:
         guard.rampe.restore(knowledge)
+        guard.situations.restore(knowledge)
     if not learn:
         _freeze(guard)
-    column = {zone: z for z, zone in enumerate(zones)}
-    times: list[float] = []
-    scores, floors = [], []
+    alerts = machine.site.guard.alerts
+    notes = _Notes(zones)
     transitions: list[tuple[float, str, Level]] = []
-    last: tuple[object, ...] | None = None
+    shown: dict[str, Level] = {}
+    last: tuple[ZoneRisk, ...] = ()
     for now_s, inputs in log.steps():
         events = guard.step(inputs, now_s)
-        transitions += [
-            (now_s, event.zone, event.level)
-            for event in events
-            if isinstance(event, AlertEvent) and event.zone != SYSTEM_ZONE
-        ]
-        if not inputs.actuators:
+        if inputs.actuators:
+            told = guard.snapshot(now_s)
+            if told.risks is not last:
+                last = told.risks
+                notes.take(now_s, last, _floors(told.sweeps, last, alerts, shown))
+        for event in events:
+            if isinstance(event, AlertEvent) and event.zone != SYSTEM_ZONE:
+                transitions.append((now_s, event.zone, event.level))
+                shown[event.zone] = event.level
+    known = {**guard.rampe.snapshot(), **guard.situations.snapshot()}
+    return GuardRun(notes.trace(), notes.certain(), tuple(transitions), known)
+
+
+class _Notes:
+    """What was said of some zones, evaluation by evaluation."""
+
+    def __init__(self, zones: tuple[str, ...]) -> None:
+        self._zones = zones
+        self._column = {zone: z for z, zone in enumerate(zones)}
+        self._time_s: list[float] = []
+        self._score: list[list[float]] = []
+        self._floor: list[list[bool]] = []
+        self._certain: list[list[bool]] = []
+        self._within: list[list[tuple[float, ...]]] = []
+
+    def take(self, now_s: float, risks: tuple[ZoneRisk, ...], floors: dict[str, bool]) -> None:
+        """Take one evaluation: risks, and the floors with whether each is certain."""
+        z = len(self._zones)
+        score, within = [0.0] * z, [(0.0,) * len(HORIZONS_S)] * z
+        for risk in risks:
+            at = self._column.get(risk.zone)
+            if at is not None:
+                score[at], within[at] = risk.probability, risk.within
+        self._time_s.append(now_s)
+        self._score.append(score)
+        self._within.append(within)
+        self._floor.append([zone in floors for zone in self._zones])
+        self._certain.append([floors.get(zone, False) for zone in self._zones])
+
+    def certain(self) -> Mask:
+        """Floors that are certain (k, z)."""
+        shape = (len(self._time_s), len(self._zones))
+        return np.array(self._certain, dtype=np.bool_).reshape(shape)
+
+    def trace(self) -> Trace:
+        """All that was said."""
+        shape = (len(self._time_s), len(self._zones))
+        within = np.array(self._within, dtype=np.float64).reshape(*shape, len(HORIZONS_S))
+        return Trace(
+            np.array(self._time_s),
+            self._zones,
+            np.array(self._score, dtype=np.float64).reshape(shape),
+            np.array(self._floor, dtype=np.bool_).reshape(shape),
+            HORIZONS_S,
+            np.moveaxis(within, -1, 0),
+        )
+
+
+def _floors(
+    sweeps: tuple[SweepSummary, ...],
+    risks: tuple[ZoneRisk, ...],
+    alerts: AlertConfig,
+    shown: dict[str, Level],
+) -> dict[str, bool]:
+    """Zones whose stopping path alone makes them imminent, as `core.levels` has it.
+
+    Args:
+        sweeps: of all forecasts.
+        risks: of all zones.
+        alerts: settings.
+        shown: the level of each zone's alert before this evaluation.
+
+    Returns:
+        For each, whether it would be so with any settings.
+    """
+    risk_of = {risk.zone: risk for risk in risks}
+    found = {}
+    for told in sweeps:
+        sweep = told.zone
+        free = sweep.certificate is Certificate.FREE or (sweep.inside and not sweep.closing)
+        if told.source != "stopping" or free:
             continue
-        sweeps = guard.snapshot(now_s).sweeps
-        if sweeps is last or not sweeps:
-            continue
-        last = sweeps
-        score, floor = np.zeros(len(zones)), np.zeros(len(zones), dtype=np.bool_)
-        for told in sweeps:
-            found = told.zone
-            z = column.get(found.zone)
-            leaving = found.inside and not found.closing
-            if z is None or leaving or found.certificate is Certificate.FREE:
-                continue
-            if told.source == "stopping":
-                floor[z] = True
-            else:
-                score[z] = max(score[z], told.probability)
-        times.append(now_s)
-        scores.append(score)
-        floors.append(floor)
-    shape = (len(times), len(zones))
-    trace = Trace(
-        np.array(times),
-        zones,
-        np.array(scores).reshape(shape),
-        np.array(floors, dtype=np.bool_).reshape(shape),
-    )
-    return GuardRun(trace, tuple(transitions), guard.rampe.snapshot())
+        risk = risk_of[sweep.zone]
+        least = alerts.imminent_probability
+        if shown.get(sweep.zone, Level.CLEAR) >= Level.IMMINENT:
+            least = lowered(least, alerts.deadband_probability)
+        certain = sweep.certificate is Certificate.UNKNOWN or sweep.inside or risk.floor
+        if certain or risk.instant >= least:
+            found[sweep.zone] = certain
+    return found
 
 
 def _freeze(guard: Guard) -> None:
     """Let it learn nothing more."""
-    rampe = guard.rampe
+    rampe, situations = guard.rampe, guard.situations
     rampe.observe = lambda *_args, **_more: None  # type: ignore[method-assign]
     rampe.learn_passing = lambda *_args, **_more: None  # type: ignore[method-assign]
+    situations.see = lambda *_args, **_more: None  # type: ignore[method-assign]

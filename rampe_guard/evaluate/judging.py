@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -45,10 +45,18 @@ def truth(
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """A forecaster at one threshold; ``spread`` only where intervals were asked for."""
+    """A forecaster at one threshold.
+
+    Attributes:
+        threshold: smallest score that alarms.
+        figures: of alarms with the manners of published alerts.
+        strict: of alarms that end with their last cause; None where there is no cause to see.
+        spread: intervals of ``figures``; None where they were not asked for.
+    """
 
     threshold: float
     figures: Figures
+    strict: Figures | None
     spread: Spread | None
 
 
@@ -65,24 +73,35 @@ def point(
 ) -> Judged:
     """One point with its intervals, over all logs."""
     found = pooled(truths, traces, threshold, how)
-    return Judged(threshold, figures(found), spread(found))
+    strict = figures(pooled(truths, traces, threshold, replace(how, strict=True)))
+    return Judged(threshold, figures(found), strict, spread(found))
 
 
-def curve(truths: Sequence[Truth], traces: Sequence[Trace], how: Manners) -> list[Judged]:
-    """All thresholds, with intervals at the points nearest to `RATES`."""
-    pools = [pooled(truths, traces, p, how) for p in THRESHOLDS]
-    return with_intervals(THRESHOLDS, pools)
+def curve(
+    truths: Sequence[Truth],
+    thresholds: Sequence[float],
+    make: Callable[[float], tuple[Sequence[Trace], float]],
+    how: Manners,
+) -> list[Judged]:
+    """Points of a curve, with intervals at those nearest to `RATES`.
 
-
-def with_intervals(thresholds: Sequence[float], pools: Sequence[Pool]) -> list[Judged]:
-    """Points of a curve, with intervals at those nearest to `RATES`."""
-    reckoned = [figures(found) for found in pools]
-    rates = np.array([f.false_per_min_per_zone or 0.0 for f in reckoned])
-    chosen = {int(np.argmin(np.abs(rates - rate))) for rate in RATES} if len(rates) else set()
-    return [
-        Judged(p, f, spread(found) if k in chosen else None)
-        for k, (p, f, found) in enumerate(zip(thresholds, reckoned, pools, strict=True))
-    ]
+    Args:
+        truths: what happened in each log.
+        thresholds: of the points, or values of another parameter.
+        make: for each of these, what was said of each log and the threshold of its score.
+        how: manners of the alarms.
+    """
+    pools, points = [], []
+    for value in thresholds:
+        said, threshold = make(value)
+        found = pooled(truths, said, threshold, how)
+        strict = figures(pooled(truths, said, threshold, replace(how, strict=True)))
+        pools.append(found)
+        points.append(Judged(value, figures(found), strict, None))
+    rates = np.array([p.figures.false_per_min_per_zone or 0.0 for p in points])
+    for k in {int(np.argmin(np.abs(rates - rate))) for rate in RATES} if points else ():
+        points[k] = replace(points[k], spread=spread(pools[k]))
+    return points
 
 
 def pooled(

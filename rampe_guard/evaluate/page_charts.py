@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from html import escape
 from typing import Final
 
-from rampe_guard.evaluate.foresight import GUARD
+from rampe_guard.evaluate.definitions import GUARD, SPARING
 from rampe_guard.evaluate.report_model import LogLine, Point, ReliabilityOf, Report
 from rampe_guard.evaluate.svg import Axis, Chart, Mark, number_axis, percent_axis
 
@@ -51,6 +51,8 @@ def trade_off(report: Report, lead: str, against: str) -> str:
         chart.line(points, style)
         for point in _points([forecast.operating_point], lead, against, across):
             chart.mark(point, shape, style, 5.0)
+    sparing = report.forecasts[SPARING]
+    chart.line(_points(sparing.curve, lead, against, across), "guard thin")
     guard = report.forecasts[GUARD]
     chart.line(_points(guard.curve, lead, against, across), "guard")
     for point in _points([guard.operating_point], lead, against, across):
@@ -89,6 +91,8 @@ def reliability(of: ReliabilityOf) -> str:
         chart.mark((b.said, b.happened), "disc", "guard", 4.0)
     if of.calibration_error is not None:
         text = f"calibration error {of.calibration_error:.3f}"
+        if of.calibration_error_told is not None:
+            text += f"; of what was told, {of.calibration_error_told:.3f}"
         chart.words((0.02, 0.95), text, "strong")
     return chart.render()
 
@@ -174,13 +178,15 @@ def errors(report: Report) -> str:
     return chart.render()
 
 
-def best_within(curve: Sequence[Point], lead: str, most_false: float) -> Point | None:
-    """The point of a curve with the best coverage at no more false alarms; None without any."""
+def best_within(
+    curve: Sequence[Point], lead: str, most: float, cost: str = "false_per_min_per_zone"
+) -> Point | None:
+    """The point of a curve with the best coverage at no more of a cost; None without any."""
     fit = [
         p
         for p in curve
-        if p.false_per_min_per_zone is not None
-        and p.false_per_min_per_zone <= most_false
+        if getattr(p, cost) is not None
+        and getattr(p, cost) <= most
         and getattr(p, lead) is not None
     ]
     return max(fit, key=lambda p: getattr(p, lead), default=None)

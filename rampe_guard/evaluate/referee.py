@@ -15,9 +15,10 @@ from rampe_guard.core.types import Certificate, FloatArray, PathSweeper, ZoneSwe
 from rampe_guard.evaluate.episodes import Contact
 
 LEAVE_M = 0.005
-LEAVE_LIMIT = 0.0005
+LEAVE_LIMIT = 0.001
 """An arm is out of a zone again when it is clear by this much: [m], or the actuator's unit for
-an actuator limit, where half a millimetre of stroke or milliradian is no tremble any more.
+an actuator limit, where a millimetre of stroke or a milliradian is more than a count of the
+encoder.
 
 An arm that rests at an edge crosses it with every tremble of its encoders; that is no entry.
 """

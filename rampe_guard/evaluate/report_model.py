@@ -39,6 +39,23 @@ class Intervals(Part, frozen=True, kw_only=True):
     lead_5_percent_s: Interval
 
 
+class Strict(Part, frozen=True, kw_only=True):
+    """The figures of alarms that end with their last cause: none earns credit by staying on."""
+
+    false_per_min_per_zone: Annotated[
+        float | None, Meta(description="False alarms per minute and zone [1/min].")
+    ]
+    alarmed_share: Annotated[
+        float | None, Meta(description="Share of the time outside contact that an alarm was on.")
+    ]
+    warned_0_5_s: Share
+    warned_1_0_s: Share
+    warned_1_5_s: Share
+    warned_2_0_s: Share
+    median_lead_s: Seconds
+    missed: Annotated[int, Meta(description="Crossings without any alarm before them.")]
+
+
 class Point(Part, frozen=True, kw_only=True):
     """A forecaster at one threshold: what it is good for, and what it costs."""
 
@@ -75,6 +92,10 @@ class Point(Part, frozen=True, kw_only=True):
         int, Meta(description="Alarms that the end of a log kept from being true or false.")
     ]
     zone_minutes: Annotated[float, Meta(description="Time watched, summed over zones [min].")]
+    strict: Annotated[
+        Strict | None,
+        Meta(description="With alarms that end with their last cause; null of published alerts."),
+    ] = None
     intervals: Annotated[
         Intervals | None, Meta(description="Null at points for which none were reckoned.")
     ] = None
@@ -132,6 +153,11 @@ class ReliabilityOf(Part, frozen=True, kw_only=True):
         Meta(description="Mean |said - happened| over the bins, weighted by answers."),
     ]
     calibration_error_interval: Interval
+    answers_told: Annotated[int, Meta(description="Answers with a probability of at least 0.02.")]
+    calibration_error_told: Annotated[
+        float | None,
+        Meta(description="The error of these alone: most moments are far from any contact."),
+    ]
     bins: tuple[ReliabilityBin, ...]
 
 

@@ -1,20 +1,25 @@
 """What a forecaster said of each zone at each evaluation, and which alarms follow from it.
 
 Every forecaster, the guard and each baseline, becomes a `Trace`, and every trace goes through
-the same life of an alarm:
+the same life of an alarm, which is the one that the guard's published alerts live (`core.alarm`,
+`core.levels`), since that is what the operator hears:
 
-- *cause*: at an evaluation the floor holds, or the score is at least the threshold;
+- *cause*: at an evaluation the floor holds, or the score is at least the threshold; of an alarm
+  that is on, also where the score is only by its deadband below the threshold;
 - *on*: from the evaluation at which the cause was seen ``debounce`` times in a row, or the floor
-  ``imminent`` times (`Manners`);
-- *off*: with its last cause, once there was none for `SILENCE_S`; what comes sooner than that
-  belongs to the same alarm.
+  ``imminent`` times;
+- *off*: at the first evaluation with no cause for ``off_delay_s`` and ``release`` evaluations in a
+  row, and at least ``min_on_s`` after it came on.
 
-So an off-delay, which makes an alarm longer without foreseeing anything, earns nobody credit.
+The *strict* form ends an alarm with its last cause instead: there, staying on for long without
+foreseeing anything earns nobody credit.
 """
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -26,17 +31,48 @@ from rampe_guard.evaluate.episodes import SILENCE_S
 Mask = npt.NDArray[np.bool_]
 
 
+_DEADBAND_SHARE: Final = 0.4
+"""As in `core.levels`: a deadband is no larger than this share of its threshold."""
+
+
 @dataclass(frozen=True, slots=True)
 class Manners:
-    """How often in a row a cause must be seen, and a floor, before there is an alarm."""
+    """How an alarm lives.
+
+    Attributes:
+        debounce: how often in a row a cause must be seen before there is an alarm.
+        imminent: the same of a floor.
+        release: how often in a row no cause must be seen before it goes.
+        off_delay_s: for how long [s].
+        min_on_s: shortest life [s].
+        deadband: how far below its threshold a score holds an alarm [-].
+        strict: an alarm ends with its last cause at the full threshold.
+    """
 
     debounce: int = 1
     imminent: int = 1
+    release: int = 1
+    off_delay_s: float = 0.0
+    min_on_s: float = 0.0
+    deadband: float = 0.0
+    strict: bool = False
 
 
 def manners(alerts: AlertConfig) -> Manners:
     """Those of a site's alerts."""
-    return Manners(alerts.debounce_steps, alerts.imminent_steps)
+    return Manners(
+        alerts.debounce_steps,
+        alerts.imminent_steps,
+        alerts.release_steps,
+        alerts.off_delay_s,
+        alerts.min_on_s,
+        alerts.deadband_probability,
+    )
+
+
+def lowered(threshold: float, deadband: float) -> float:
+    """The score that holds what ``threshold`` raised."""
+    return threshold - min(deadband, _DEADBAND_SHARE * threshold)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +123,9 @@ class Trace:
 
 
 def alarms(trace: Trace, zone: int, threshold: float, how: Manners) -> FloatArray:
-    """Alarm episodes of one zone (a, 2): start and last cause [s], in order.
+    """Alarm episodes of one zone (a, 2): start and end [s], in order; inf while still on.
+
+    Alarms that no more than `SILENCE_S` parts are one episode.
 
     Args:
         trace: what was said.
@@ -95,20 +133,53 @@ def alarms(trace: Trace, zone: int, threshold: float, how: Manners) -> FloatArra
         threshold: smallest score that is a cause, above 0.
         how: manners of the alarm.
     """
-    floor = trace.floor[:, zone]
-    cause = floor | (trace.score[:, zone] >= threshold)
-    seen = np.flatnonzero(cause)
-    if not seen.size:
+    floor, score = trace.floor[:, zone], trace.score[:, zone]
+    cause = floor | (score >= threshold)
+    if not cause.any():
         return np.zeros((0, 2))
     shown = _in_a_row(cause, how.debounce) | _in_a_row(floor, how.imminent)
-    # causes parted by no more than the silence hold one alarm, from its first shown one on
-    seen_s = trace.time_s[seen]
+    if how.strict:
+        return _to_last_cause(trace.time_s, cause, shown)
+    held = floor | (score >= lowered(threshold, how.deadband))
+    return _to_calm(trace.time_s, held, shown, how)
+
+
+def _to_last_cause(time_s: FloatArray, cause: Mask, shown: Mask) -> FloatArray:
+    """Causes parted by no more than the silence hold one alarm, from its first shown one on."""
+    seen = np.flatnonzero(cause)
+    seen_s = time_s[seen]
     first = np.flatnonzero(np.diff(seen_s, prepend=-np.inf) > SILENCE_S)
     last = np.append(first[1:], len(seen)) - 1
     shown_at = np.append(np.flatnonzero(shown), len(cause))
     start = shown_at[np.searchsorted(shown_at, seen[first])]
     ever = start <= seen[last]
-    return np.column_stack((trace.time_s[start[ever]], seen_s[last[ever]]))
+    return np.column_stack((time_s[start[ever]], seen_s[last[ever]]))
+
+
+def _to_calm(time_s: FloatArray, held: Mask, shown: Mask, how: Manners) -> FloatArray:
+    """From each first shown cause to the first evaluation at which all is calm."""
+    # calm lies between one held evaluation and the next: from ``calm`` to before ``following``
+    at = np.flatnonzero(held)
+    following = np.append(at[1:], len(held) + 1)
+    calm = np.maximum(np.searchsorted(time_s, time_s[at] + how.off_delay_s), at + how.release)
+    some = calm < np.minimum(following, len(held))
+    calm_at, until = calm[some].tolist(), following[some].tolist()
+    index = np.flatnonzero(shown)
+    ripe = np.searchsorted(time_s, time_s[index] + how.min_on_s).tolist()
+    starts = index.tolist()
+    found: list[tuple[float, float]] = []
+    k = 0
+    while k < len(starts):
+        start_s, end_s = float(time_s[starts[k]]), np.inf
+        gap = bisect_right(until, ripe[k])
+        end = max(calm_at[gap], ripe[k]) if gap < len(until) else len(held)
+        if end < len(held):
+            end_s = float(time_s[end])
+        if found and start_s <= found[-1][1] + SILENCE_S:
+            start_s = found.pop()[0]
+        found.append((start_s, end_s))
+        k = bisect_left(starts, end, k)
+    return np.array(found).reshape(-1, 2)
 
 
 def _in_a_row(on: Mask, steps: int) -> Mask:

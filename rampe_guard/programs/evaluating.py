@@ -20,7 +20,8 @@ from rich.text import Text
 from rampe_guard.collision import load_arm
 from rampe_guard.errors import RampeGuardError
 from rampe_guard.evaluate.crew import Findings, Order, crew, evaluate_all
-from rampe_guard.evaluate.foresight import GUARD, report
+from rampe_guard.evaluate.definitions import GUARD
+from rampe_guard.evaluate.foresight import report
 from rampe_guard.evaluate.foresight_page import page
 from rampe_guard.evaluate.prediction_plot import draw
 from rampe_guard.evaluate.report_model import Point, Report, report_bytes
@@ -197,6 +198,9 @@ def _table(made: Report) -> Table:
         "median\nlead",
         "missed",
         "on",
+        "strict:\nfalse",
+        "≥ 0.5 s",
+        "≥ 1.0 s",
     ):
         table.add_column(name, header_style="dim", justify="right", no_wrap=True)
     for name, forecast in made.forecasts.items():
@@ -209,11 +213,22 @@ def _table(made: Report) -> Table:
 
 def _cells(at: Point) -> tuple[str, ...]:
     shares = (at.warned_0_5_s, at.warned_1_0_s, at.warned_1_5_s)
-    rate, lead = at.false_per_min_per_zone, at.median_lead_s
+    lead, strict = at.median_lead_s, at.strict
     return (
-        "—" if rate is None else f"{rate:.2f}",
-        *("—" if share is None else f"{share:.0%}" for share in shares),
+        _rate(at.false_per_min_per_zone),
+        *map(_share, shares),
         "—" if lead is None else f"{lead:.2f} s",
         str(at.missed),
-        "—" if at.alarmed_share is None else f"{at.alarmed_share:.0%}",
+        _share(at.alarmed_share),
+        "" if strict is None else _rate(strict.false_per_min_per_zone),
+        "" if strict is None else _share(strict.warned_0_5_s),
+        "" if strict is None else _share(strict.warned_1_0_s),
     )
+
+
+def _rate(value: float | None) -> str:
+    return "—" if value is None else f"{value:.2f}"
+
+
+def _share(value: float | None) -> str:
+    return "—" if value is None else f"{value:.0%}"

@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rampe_guard.core.alarm import Alarm, Level
 from rampe_guard.core.config import AlertConfig
 from rampe_guard.evaluate.episodes import SILENCE_S
 from rampe_guard.evaluate.outcome import FALSE, TRUE, UNDECIDED, judge
-from rampe_guard.evaluate.trace import Manners, Trace, alarms, manners
+from rampe_guard.evaluate.trace import Manners, Trace, alarms, lowered, manners
 
 PERIOD_S = 0.1
 
@@ -30,7 +31,7 @@ def trace(scores: Sequence[float], floors: Sequence[bool] | None = None) -> Trac
 
 
 def slowly(said: Trace, threshold: float, how: Manners) -> list[tuple[float, float]]:
-    """One evaluation after the other, as the docstring says it."""
+    """The strict form, one evaluation after the other, as the docstring says it."""
     found: list[tuple[float, float]] = []
     start: float | None = None
     last = -np.inf
@@ -60,16 +61,73 @@ def slowly(said: Trace, threshold: float, how: Manners) -> list[tuple[float, flo
     st.integers(1, 4),
     st.integers(1, 3),
 )
-def test_alarms_are_those_of_one_evaluation_after_the_other(
+def test_strict_alarms_are_those_of_one_evaluation_after_the_other(
     said: list[tuple[float, bool]], threshold: float, debounce: int, imminent: int
 ) -> None:
     # a floor at every third at most, or it would hide the scores
     floors = [floor and k % 3 == 0 for k, (_, floor) in enumerate(said)]
     heard = trace([score for score, _ in said], floors)
-    how = Manners(debounce, imminent)
+    how = Manners(debounce, imminent, 5, 0.5, 1.0, 0.1, strict=True)
     assert alarms(heard, 0, threshold, how).tolist() == [
         list(span) for span in slowly(heard, threshold, how)
     ]
+
+
+def lived(said: Trace, threshold: float, config: AlertConfig) -> list[tuple[float, float]]:
+    """The guard's own alarm, stepped with what each evaluation says."""
+    alarm = Alarm(config)
+    found: list[tuple[float, float]] = []
+    for time_s, score, floor in zip(
+        said.time_s.tolist(), said.score[:, 0].tolist(), said.floor[:, 0].tolist(), strict=True
+    ):
+        was = alarm.level
+        least = lowered(threshold, config.deadband_probability) if was else threshold
+        alarm.step(Level.WARNING if floor or score >= least else Level.CLEAR, time_s)
+        if alarm.level and not was:
+            joined = found and time_s <= found[-1][1] + SILENCE_S
+            found.append((found.pop()[0] if joined else time_s, np.inf))
+        elif was and not alarm.level:
+            found[-1] = (found[-1][0], time_s)
+    return found
+
+
+@given(
+    st.lists(st.sampled_from([0.0, 0.0, 0.15, 0.22, 0.3, 0.7]), max_size=90),
+    st.lists(st.sampled_from([0.04, 0.1, 0.1, 0.7]), min_size=90, max_size=90),
+    st.sampled_from([0.2, 0.3, 0.5]),
+    st.integers(1, 3),
+    st.integers(1, 6),
+    st.sampled_from([(0.0, 0.0), (0.5, 1.0), (0.3, 0.0), (0.0, 2.0)]),
+)
+def test_alarms_live_as_the_guards_published_alerts_do(
+    scores: list[float],
+    gaps: list[float],
+    threshold: float,
+    debounce: int,
+    release: int,
+    delays: tuple[float, float],
+) -> None:
+    config = AlertConfig(
+        debounce_steps=debounce, release_steps=release, off_delay_s=delays[0], min_on_s=delays[1]
+    )
+    k = len(scores)
+    heard = Trace(
+        np.cumsum(gaps[:k]),
+        ("wall",),
+        np.array(scores).reshape(k, 1),
+        np.zeros((k, 1), dtype=np.bool_),
+    )
+    assert alarms(heard, 0, threshold, manners(config)).tolist() == [
+        list(span) for span in lived(heard, threshold, config)
+    ]
+
+
+def test_a_floor_alarms_at_once_and_holds_as_long_as_any_cause() -> None:
+    heard = trace([0.0] * 40, [k in {3, 8} for k in range(40)])
+    how = manners(AlertConfig())
+    assert how.debounce > how.imminent == 1
+    assert alarms(heard, 0, 0.5, how).tolist() == [[pytest.approx(0.3), pytest.approx(1.3)]]
+    assert not len(alarms(trace([0.0, 0.9, 0.0, 0.9] * 9), 0, 0.5, how))  # never twice in a row
 
 
 def test_a_lower_threshold_never_shortens_what_is_alarmed() -> None:
@@ -83,7 +141,10 @@ def test_a_lower_threshold_never_shortens_what_is_alarmed() -> None:
 
 
 def test_manners_are_those_of_the_sites_alerts() -> None:
-    assert manners(AlertConfig(debounce_steps=3, imminent_steps=2)) == Manners(3, 2)
+    alerts = AlertConfig(
+        debounce_steps=3, imminent_steps=2, release_steps=4, off_delay_s=0.6, min_on_s=0.9
+    )
+    assert manners(alerts) == Manners(3, 2, 4, 0.6, 0.9, alerts.deadband_probability)
 
 
 @pytest.mark.parametrize("score", [-0.1, 1.1, float("nan")])

@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rampe_guard.evaluate.episodes import Contact
 from rampe_guard.evaluate.foretold import came
-from rampe_guard.evaluate.judging import RATES, THRESHOLDS, with_intervals
+from rampe_guard.evaluate.judging import RATES, THRESHOLDS, curve, truth
 from rampe_guard.evaluate.odds import odds
 from rampe_guard.evaluate.outcome import Outcome, judge
 from rampe_guard.evaluate.points import RESAMPLES, Pool, block_of, draws, figures, pool, spread
+from rampe_guard.evaluate.trace import Manners, Trace
 
 TEN_MINUTES = (0.0, 600.0)
 
@@ -93,8 +95,24 @@ def test_blocks_of_a_window_hold_its_ends() -> None:
 
 
 def test_a_curve_has_intervals_where_rates_are_asked_for() -> None:
-    pools = [pool([(outcome([1.0], [10.0 + 2 * k for k in range(n)]),)]) for n in range(20)]
-    found = with_intervals(range(20), pools)
+    # n alarms in ten minutes, each in its own half minute, for the n of the point
+    def said(count: float) -> tuple[list[Trace], float]:
+        time_s = np.arange(0.0, 600.0, 0.1)
+        score = np.zeros((len(time_s), 1))
+        for k in range(int(count)):
+            score[30 + 300 * k : 40 + 300 * k] = 0.9
+        return [Trace(time_s, ("wall",), score, np.zeros(score.shape, dtype=np.bool_))], 0.5
+
+    log = truth("a log", ("wall",), [Contact("wall", 595.0, 596.0)], TEN_MINUTES)
+    found = curve([log], range(20), said, Manners(release=1, off_delay_s=0.5))
+    assert [j.figures.false_alarms for j in found] == list(range(20))
+    assert [j.strict.false_alarms for j in found if j.strict] == list(range(20))
+    # staying on costs time: the last 0.5 s and the evaluation at which it ends
+    last = found[-1]
+    assert last.strict is not None
+    assert last.figures.alarmed_share is not None
+    assert last.strict.alarmed_share is not None
+    assert last.figures.alarmed_share > 1.4 * last.strict.alarmed_share > 0.0
     chosen = {j.threshold for j in found if j.spread is not None}
     assert chosen == {10.0 * rate for rate in RATES if rate <= 1.9} | {19.0}
     assert len(THRESHOLDS) >= 60
