@@ -88,7 +88,7 @@ def test_what_is_told_to_go_on_is_what_truly_went_on(seed: int) -> None:
         assert any(
             np.allclose(clock[i : i + m] - clock[i], analogue.time_s)
             and np.allclose(position[i : i + m] - position[i], analogue.path)
-            for i in range(len(clock) - m)
+            for i in range(len(clock) - m + 1)
         )
 
 
