@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rampe_guard.core.alarm import Inhibit, Level, State
-from rampe_guard.core.config import InputConfig
+from rampe_guard.core.config import InputConfig, NextConfig
 from rampe_guard.core.events import SYSTEM_ZONE, AlertEvent, RefusalEvent
 from rampe_guard.core.monitor import RECENT_S, Status
 from rampe_guard.core.types import EnabledSample, Inputs
@@ -29,11 +29,13 @@ def status(rig: CoreRig) -> Status:
 
 def warned() -> CoreRig:
     """An operator who is known, on his way to the wall: warned, not yet imminent."""
-    rig = CoreRig()
+    # without what memory foresees, which would warn while he still rests
+    rig = CoreRig(config=replace(CONFIG, next=NextConfig(enabled=False)))
     rig.strokes(4, length=1.2)
     rig.events.clear()
     while not any(a.level is Level.WARNING for a in rig.alerts()):
         rig.tick(0.5)
+        assert rig.q < 1.0, "never warned"
     return rig
 
 
