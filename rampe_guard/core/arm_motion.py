@@ -98,9 +98,7 @@ def valid_end(arm: ArmMotion, start: FloatArray, displacement: FloatArray) -> fl
         return None
     if (start < arm.lower).any() or (start > arm.upper).any():
         return None
-    end = 1.0
-    for q, x, low, high in zip(start, displacement, arm.lower, arm.upper, strict=True):
-        room = high - q if x > 0.0 else q - low
-        if abs(x) > room:
-            end = min(end, float(room / abs(x)))
-    return end
+    room = np.where(displacement > 0.0, arm.upper - start, start - arm.lower)
+    way = np.abs(displacement)
+    beyond = way > room
+    return float((room[beyond] / way[beyond]).min()) if beyond.any() else 1.0

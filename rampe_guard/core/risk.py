@@ -11,8 +11,8 @@ What memory says is counted in: of similar situations with weights wᵢ, those t
 
 So in a new place the present motion speaks alone, and where the operator has been many times,
 what he did there. Of the stopping paths that touch, a third to a half end in contact, since
-operators brake by themselves. P is smoothed over a fifth of a second, so that alarms do not flicker with
-the choice of situations; the stopping path does not wait for it.
+operators brake by themselves. P is smoothed over a quarter of a second, so that alarms do not
+flicker with the choice of situations; what decides about the stopping path is not.
 """
 
 from __future__ import annotations
@@ -29,7 +29,10 @@ HORIZONS_S: Final = (0.5, 1.0, 2.0)
 _PRIOR_WEIGHT: Final = 2.0
 _BRAKES: Final = 0.5
 _TOO_LATE: Final = 0.8
-_SMOOTH_S: Final = 0.2
+_SMOOTH_S: Final = 0.25
+_NOTHING: Final = 1e-9
+"""A probability below this is none."""
+_NEVER: Final = tuple(0.0 for _ in HORIZONS_S)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +58,9 @@ class Threat:
             self.intent if self.intent_s <= limit_s else 0.0,
             stopping if self.stop_s <= limit_s else 0.0,
         )
+
+
+_NONE: Final = Threat()
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +100,7 @@ class RiskBook:
         self._smooth: dict[str, list[float]] = {}
         self._stamp_s: float | None = None
         self._share = 1.0
+        self._first = True
 
     def forget(self) -> None:
         """Something was missing: what was, says nothing of what is."""
@@ -102,6 +109,7 @@ class RiskBook:
 
     def begin(self, stamp_s: float) -> None:
         """The zones of one evaluation follow, of this stamp [s]."""
+        self._first = self._stamp_s is None
         past_s = 0.0 if self._stamp_s is None else max(stamp_s - self._stamp_s, 0.0)
         self._share = 1.0 - math.exp(-past_s / _SMOOTH_S)
         self._stamp_s = stamp_s
@@ -118,6 +126,9 @@ class RiskBook:
             reach_s: time that it takes to react and to stop [s].
             stamp_s: now, on the clock of the inputs' stamps [s].
         """
+        before = self._smooth.get(zone)
+        if before is None and threat == _NONE and zone not in outlook.meetings:
+            return ZoneRisk(zone, _NEVER, 0.0, 0.0, 0.0, None, "intent", floor=False)
         total = _PRIOR_WEIGHT + outlook.weight
         limits = (*HORIZONS_S, self._horizon_s, reach_s)
         met = outlook.met_within(zone, limits, stamp_s)
@@ -125,9 +136,12 @@ class RiskBook:
             (_PRIOR_WEIGHT * threat.within(limit_s) + weight) / total
             for limit_s, weight in zip(limits, met, strict=True)
         ]
-        before = self._smooth.get(zone, raw)
-        smooth = [old + self._share * (new - old) for old, new in zip(before, raw, strict=True)]
-        self._smooth[zone] = smooth
+        past = before or (raw if self._first else [0.0] * len(raw))
+        smooth = [old + self._share * (new - old) for old, new in zip(past, raw, strict=True)]
+        if max(smooth) > _NOTHING:
+            self._smooth[zone] = smooth
+        else:
+            self._smooth.pop(zone, None)
         *within, probability, soon = smooth
         beyond = threat.intent if threat.intent_s > self._horizon_s else 0.0
         meeting = outlook.first(zone)

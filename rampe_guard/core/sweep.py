@@ -110,11 +110,11 @@ class Sweep:
             )
         zones, lost = self._place(placed or {}, asked, wider_m)
         told: list[Group] = []
+        queries = 0
         if any(i in self._solid for i in asked):
             groups = self._search(zones, start, displacement, end, clearance=clearance, worst=worst)
             told = groups.view(np.ndarray).tolist()
-        else:
-            problem.scratch.spent[0] = 0
+            queries = int(problem.scratch.spent[0])
         moving = bool(displacement.any())
         entries = []
         if worst:
@@ -130,7 +130,7 @@ class Sweep:
             else:
                 found = told[self._group[index]]
                 entries.append(_from_margin(self._entry(zone, found, end, moving=moving), wider_m))
-        result = SweepResult(zones=tuple(entries), queries=int(problem.scratch.spent[0]))
+        result = SweepResult(zones=tuple(entries), queries=queries)
         if not any_path:
             return result
         answer, witness = self._any_way.answer(zones, result, start, displacement)

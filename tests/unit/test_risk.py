@@ -66,7 +66,7 @@ def test_it_is_smoothed_and_what_decides_about_stopping_is_not() -> None:
     book.begin(10.1)
     risk = book.weigh("wall", Threat(stop_s=0.3), NOTHING, 0.7, 10.1)
     assert risk.instant == pytest.approx(0.5)
-    assert risk.probability == pytest.approx(0.5 * (1.0 - np.exp(-0.5)))
+    assert risk.probability == pytest.approx(0.5 * (1.0 - np.exp(-0.1 / 0.25)))
     book.forget()
     book.begin(10.2)
     assert book.weigh("wall", Threat(stop_s=0.3), NOTHING, 0.7, 10.2).probability == 0.5
