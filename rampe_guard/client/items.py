@@ -136,6 +136,8 @@ def ended(alert: Alert, received_s: float) -> Alert:
         previous_level=alert.level,
         state="normal",
         probability=None,
+        similar_situations=None,
+        similar_contacts=None,
         time_to_collision_s=None,
         received_s=received_s,
         inferred=True,

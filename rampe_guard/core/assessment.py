@@ -224,10 +224,10 @@ def _explained(evidence: Evidence, outlook: Outlook) -> Evidence:
     """The situations behind it."""
     sweep = evidence.sweep
     meeting = None if sweep is None else outlook.first(sweep.zone)
-    if sweep is None or meeting is None:
+    if sweep is None or meeting is None or outlook.position is None:
         return evidence
     met = sum(m.count for m in outlook.meetings[sweep.zone])
-    return replace(evidence, similar=outlook.count, met=met, onward=meeting.end)
+    return replace(evidence, similar=outlook.count, met=met, onward=outlook.position + meeting.end)
 
 
 def _summaries(

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from rampe_guard.core.alarm import Inhibit, Level, State
+from rampe_guard.core.foresight import NOTHING, Outlook
 from rampe_guard.core.types import Category, FloatArray, ZoneSweep
 
 Source: TypeAlias = Literal["stopping", "intent", "next", "contact", "system"]
@@ -28,7 +29,7 @@ class Evidence:
         note: extra words (system: the reason).
         similar: similar situations of the past that were asked (see `foresight`), 0 for none.
         met: those of them that went on to meet the zone.
-        onward: where the likeliest of these led: displacement from now (n,) [unit], or None.
+        onward: position to which the likeliest of these leads (n,) [unit], or None.
     """
 
     level: Level
@@ -129,6 +130,7 @@ class PredictionEvent:
     sweeps: tuple[SweepSummary, ...]
     stamp_s: float
     now_s: float
+    outlook: Outlook = NOTHING
 
 
 @dataclass(frozen=True, slots=True)

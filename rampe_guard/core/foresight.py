@@ -61,6 +61,7 @@ class Outlook:
         scenarios: distinct ways on, the weightiest first.
         meetings: by zone.
         looked_s: when, on the clock of the inputs' stamps [s].
+        position: from where (n,) [unit]; None if it was not looked.
     """
 
     weight: float = 0.0
@@ -68,6 +69,7 @@ class Outlook:
     scenarios: tuple[Scenario, ...] = ()
     meetings: Mapping[str, tuple[Meeting, ...]] = field(default_factory=dict)
     looked_s: float = 0.0
+    position: FloatArray | None = None
 
     def met_within(self, zone: str, limits_s: Sequence[float], stamp_s: float) -> list[float]:
         """Weights of the scenarios that meet a zone within each limit of a stamp [s]."""
@@ -165,6 +167,7 @@ class Foresight:
             scenarios=tuple(ways),
             meetings={zone: tuple(found) for zone, found in meetings.items()},
             looked_s=stamp_s,
+            position=position,
         )
         return self._outlook
 

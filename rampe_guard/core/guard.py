@@ -239,7 +239,13 @@ class Guard:
         for event in events:
             if isinstance(event, PredictionEvent) and event.event == "ended":
                 self._monitor.lesson(event.refusal)
-        return events
+        return [self._foretold(event) for event in events]
+
+    def _foretold(self, event: Event) -> Event:
+        """A prediction with the ways on that memory knows."""
+        if isinstance(event, PredictionEvent):
+            return replace(event, outlook=self._assessor.foresight.outlook)
+        return event
 
     def _refuse(self, name: InputName, reason: str, now_s: float) -> None:
         self._monitor.reject(name, reason, now_s)
@@ -272,7 +278,8 @@ class Guard:
         self._sweeps, self._risks = found.sweeps, found.risks
         moment = self._moment(self._health(now_s), now_s)
         alerts = self._annunciator.update(found.evidence, moment)
-        return [*alerts, *self._intention.update(newest.position, self._sweeps, now_s)]
+        news = self._intention.update(newest.position, self._sweeps, now_s)
+        return [*alerts, *(self._foretold(event) for event in news)]
 
     def _must_look(self, now_s: float) -> bool:
         # a hair less than the period, so that it survives the rounding of ticks

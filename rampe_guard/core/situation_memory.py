@@ -47,7 +47,8 @@ _CANDIDATES: Final = 32
 """Nodes looked at in each chunk: a pass has several."""
 _SPARE: Final = 2
 """Finds kept beyond those wanted: the future of some is not known."""
-_VERSION: Final = 1
+VERSION: Final = 1
+"""Of what a snapshot means."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,13 +181,22 @@ class SituationMemory:
 
     def snapshot(self) -> dict[str, FloatArray]:
         """All that is remembered; see `restore`."""
-        chunks = self._chunks
+        clock, position, points = zip(*self.pieces(), strict=True)
         return {
-            "next_version": np.array(_VERSION),
-            "next_clock": np.concatenate([c.clock[: c.count] for c in chunks]),
-            "next_position": np.concatenate([c.position[: c.count] for c in chunks]),
-            "next_point": np.concatenate([c.points[: c.count] for c in chunks]).astype(np.float32),
+            "next_version": np.array(VERSION),
+            "next_clock": np.concatenate(clock),
+            "next_position": np.concatenate(position),
+            "next_point": np.concatenate(points).astype(np.float32),
         }
+
+    def pieces(self) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
+        """The same chunk by chunk: clock (k,) [s], position (k, n) and points (k, 3n).
+
+        What they hold is never written again, so another thread may take its time over them.
+        """
+        return [
+            (c.clock[: c.count], c.position[: c.count], c.points[: c.count]) for c in self._chunks
+        ]
 
     def restore(self, arrays: Arrays | Mapping[str, FloatArray]) -> None:
         """Go on from a snapshot.
@@ -195,8 +205,8 @@ class SituationMemory:
             ValueError: it is not of such a memory.
         """
         version = entry(arrays, "next_version")
-        if version.shape != () or int(version) != _VERSION:
-            raise ValueError(f"snapshot has next_version {version.tolist()}, need {_VERSION}")
+        if version.shape != () or int(version) != VERSION:
+            raise ValueError(f"snapshot has next_version {version.tolist()}, need {VERSION}")
         clock = entry(arrays, "next_clock").astype(np.float64)
         position = entry(arrays, "next_position").astype(np.float64)
         points = entry(arrays, "next_point").astype(np.float64)

@@ -122,6 +122,7 @@ class Pulse:
         primitives: dict[str, int],
         extra: Iterable[wire.Reason] = (),
         canary: wire.CanaryTrial | None = None,
+        memory: wire.Remembered | None = None,
     ) -> wire.Heartbeat:
         """A heartbeat; ``extra`` are reasons that only the daemon knows (no router, say)."""
         self._seq += 1
@@ -154,6 +155,7 @@ class Pulse:
             objects=self._objects(health.objects, now_s),
             canary=canary,
             primitives=primitives,
+            memory=memory,
             drops=overruns,
             loop_ms=self.loop_ms.quantiles(),
             sweep_ms=self.sweep_ms.quantiles(),

@@ -19,6 +19,7 @@ from rampe_guard.core.events import (
     PredictionSummary,
     SweepSummary,
 )
+from rampe_guard.core.foresight import Outlook
 from rampe_guard.core.guard import Snapshot
 from rampe_guard.core.types import FloatArray
 from rampe_guard.settings import Site
@@ -43,6 +44,7 @@ class Scribe:
         found, sweep, told = event.evidence, event.evidence.sweep, event.prediction
         clear = event.level is Level.CLEAR
         zone = None if event.zone == SYSTEM_ZONE else event.zone
+        times = (found.met, found.similar) if found.similar and not clear else None
         return wire.Alert(
             alert_id=event.alert_id,
             boot_id=self.boot_id,
@@ -64,7 +66,9 @@ class Scribe:
             **_words(event),
             observations=None if told is None else told.occurrences,
             predicted_displacement=self._by_name(None if told is None else told.mean),
-            predicted_endpoint=self._by_name(None if told is None else told.endpoint),
+            predicted_endpoint=self._by_name(_leads_to(event)),
+            similar_situations=times[1] if times else None,
+            similar_contacts=times[0] if times else None,
             stamp=event.stamp_s,
             published_unix_s=self.unix_s(event.now_s),
             input_age_s=event.input_age_s,
@@ -82,6 +86,7 @@ class Scribe:
                 event.level.word,
                 found.source,
                 machine_off=event.inhibit is Inhibit.MACHINE_OFF,
+                times=times,
             ),
         )
 
@@ -101,6 +106,7 @@ class Scribe:
             endpoints=self._endpoints(event.prediction),
             any_path=None,
             sweeps=tuple(_sweep(s) for s in event.sweeps),
+            scenarios=self._scenarios(event.outlook),
             stamp=event.stamp_s,
             published_unix_s=self.unix_s(event.now_s),
         )
@@ -143,10 +149,31 @@ class Scribe:
             for end, share in zip(told.endpoints, told.endpoint_shares, strict=True)
         )
 
+    def _scenarios(self, outlook: Outlook) -> tuple[wire.Scenario, ...]:
+        here = outlook.position
+        if here is None:
+            return ()
+        return tuple(
+            wire.Scenario(
+                share=min(way.weight / outlook.weight, 1.0),
+                count=way.count,
+                duration_s=float(way.time_s[-1]),
+                endpoint=self._by_name(here + way.end) or {},
+            )
+            for way in outlook.scenarios
+        )
+
     def _by_name(self, values: FloatArray | None) -> dict[str, float] | None:
         if values is None:
             return None
         return dict(zip(self.site.actuator_names, values.tolist(), strict=True))
+
+
+def _leads_to(event: AlertEvent) -> FloatArray | None:
+    """Where the motion is likely to end (n,) [unit]."""
+    if event.evidence.source == "next":
+        return event.evidence.onward
+    return None if event.prediction is None else event.prediction.endpoint
 
 
 def _words(event: AlertEvent) -> dict[str, Any]:

@@ -23,10 +23,12 @@ from types import TracebackType
 from typing import Self
 
 from rampe_guard.errors import ModelFileError
-from rampe_guard.runtime.store_format import MAX_BYTES
+from rampe_guard.runtime.store_format import MAX_BYTES, MAX_SITUATION_BYTES
 from rampe_guard.settings import Site
 
 SUFFIX = ".npz"
+SITUATIONS_SUFFIX = ".situations.npz"
+"""Of the file beside it that holds the remembered situations; no operator's name has a dot."""
 _PRIVATE_FILE, _PRIVATE_FOLDER = 0o600, 0o700
 """How a person works is nobody else's business."""
 _PLAIN = re.compile(r"[a-z0-9][a-z0-9_-]*")
@@ -44,6 +46,12 @@ def model_folder(site: Site) -> Path:
 def model_path(site: Site) -> Path:
     """The file of the site's operator; `ModelFileError` as `model_folder`."""
     return model_folder(site) / (safe_name(site.operator) + SUFFIX)
+
+
+def situations_file(model: Path) -> ModelFile:
+    """The file of the situations that are remembered beside a model."""
+    path = model.with_name(model.name.removesuffix(SUFFIX) + SITUATIONS_SUFFIX)
+    return ModelFile(path, MAX_SITUATION_BYTES)
 
 
 def safe_name(name: str) -> str:
@@ -83,10 +91,12 @@ class ModelFile:
 
     Args:
         path: of the file; its folder is made when the lock is taken.
+        most_bytes: a larger file is not read.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, most_bytes: int = MAX_BYTES) -> None:
         self.path = path
+        self._most_bytes = most_bytes
         self._temporary = path.with_name(path.name + ".tmp")
         self._lock_path = path.with_name(path.name + ".lock")
         self._lock: int | None = None
@@ -163,10 +173,10 @@ class ModelFile:
             status = os.fstat(descriptor)
             if not stat.S_ISREG(status.st_mode):
                 raise ModelFileError("it is not a regular file")
-            if status.st_size > MAX_BYTES:
+            if status.st_size > self._most_bytes:
                 raise ModelFileError(f"it has {status.st_size >> 20} MiB, too much for a model")
             with os.fdopen(descriptor, "rb", closefd=False) as file:
-                return file.read(MAX_BYTES)
+                return file.read(self._most_bytes)
         except OSError as error:
             raise ModelFileError(f"it cannot be read: {error.strerror or error}") from None
         finally:

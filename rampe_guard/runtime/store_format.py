@@ -28,8 +28,11 @@ from rampe_guard.errors import ModelFileError
 from rampe_guard.settings import Site
 
 FORMAT: Final = "rampe.model.v1"
+SITUATIONS: Final = "rampe.situations.v1"
 MAX_BYTES: Final = 64 * 2**20
 """Largest file that is written or read: far above what a hand of 28 axes learns in a year."""
+MAX_SITUATION_BYTES: Final = 256 * 2**20
+"""The same of situations: a day of 4 actuators has 18 MiB, of 16 some 65 MiB."""
 MAX_ARRAYS: Final = 100_000
 MAX_ARRAY_NAME: Final = 200
 
@@ -39,8 +42,12 @@ _HEADER = "header"
 _SUFFIX = ".npy"
 _NUMERIC = "biuf"
 """Kinds of numpy's dtypes: bool, int, unsigned, float."""
-_SAME = ("basis", "observations")
-"""Settings that decide what the numbers mean; others, how one goes on from them."""
+_SAME: Final = {
+    FORMAT: (("basis", "rampe.basis"), ("observations", "rampe.observations")),
+    SITUATIONS: (("max_velocity", "max_velocity"),),
+}
+"""Settings that decide what the numbers mean, and their names in the site file; others decide how
+one goes on from them."""
 _SAME_LIMIT = 1e-6
 """Limits may differ by this share of the range: rounding in the URDF and in the drive."""
 _BROKEN = (
@@ -73,15 +80,15 @@ class Header(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         version: of the software that wrote it.
         site, machine, operator: whose model it is.
         actuators: in the order of the arrays.
-        settings: of the estimator (`core.config.RampeConfig`).
+        settings: of the estimator (`core.config.RampeConfig`); of situations, what scales them.
         saved_unix_s: when it was saved [s].
-        categories: how many were learned.
-        occurrences: primitives learned, of all categories.
+        categories: how many were learned; 0 of situations.
+        occurrences: primitives learned, of all categories; of situations, how many there are.
         refused: primitives that were not learned, by reason.
         arrays: type and shape of every array, such as ``<f8(3, 4)``.
     """
 
-    format: Literal["rampe.model.v1"] = FORMAT
+    format: Literal["rampe.model.v1", "rampe.situations.v1"] = FORMAT
     version: str = __version__
     site: str
     machine: str
@@ -122,6 +129,14 @@ def header_of(site: Site, limits: FloatArray) -> Header:
     )
 
 
+def situations_header(site: Site, limits: FloatArray) -> Header:
+    """The same of situations."""
+    top = [actuator.max_velocity for actuator in site.guard.actuators]
+    return msgspec.structs.replace(
+        header_of(site, limits), format=SITUATIONS, settings={"max_velocity": top}
+    )
+
+
 def misfit(found: Header, needed: Header) -> str | None:
     """Why a model with the header ``found`` cannot serve where ``needed`` is; None if it can."""
     for field in ("site", "machine", "operator"):
@@ -137,10 +152,10 @@ def misfit(found: Header, needed: Header) -> str | None:
                 f"the limits of {old.name} were {_span(old)} when it was learned and are"
                 f" {_span(new)} now"
             )
-    for name in _SAME:
+    for name, told in _SAME[needed.format]:
         was, now = found.settings.get(name), needed.settings.get(name)
         if was != now:
-            return f"it was learned with rampe.{name} {was!r}; the site file has {now!r}"
+            return f"it was learned with {told} {was!r}; the site file has {now!r}"
     return None
 
 
@@ -149,8 +164,9 @@ def encode(header: Header, arrays: Mapping[str, npt.NDArray[Any]]) -> bytes:
 
     Raises:
         ValueError: an array is not numeric, or its name cannot stand in a file.
-        ModelFileError: the file would be larger than `MAX_BYTES`.
+        ModelFileError: the file would be larger than its format may be (`most_bytes`).
     """
+    most = most_bytes(header.format)
     described = {}
     for name, array in arrays.items():
         if array.dtype.kind not in _NUMERIC or array.dtype.hasobject:
@@ -159,8 +175,8 @@ def encode(header: Header, arrays: Mapping[str, npt.NDArray[Any]]) -> bytes:
             raise ValueError(f"{name!r} cannot be the name of an array")
         described[name] = _described(array)
     total = sum(array.nbytes for array in arrays.values())
-    if total > MAX_BYTES or len(arrays) > MAX_ARRAYS:
-        raise ModelFileError(_too_large(total, len(arrays)))
+    if total > most or len(arrays) > MAX_ARRAYS:
+        raise ModelFileError(_too_large(total, len(arrays), most))
     text = msgspec.json.encode(msgspec.structs.replace(header, arrays=described))
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w") as archive:
@@ -170,24 +186,30 @@ def encode(header: Header, arrays: Mapping[str, npt.NDArray[Any]]) -> bytes:
             # a member written by name would carry the time of day
             archive.writestr(zipfile.ZipInfo(name + _SUFFIX), member.getbuffer())
     content = out.getvalue()
-    if len(content) > MAX_BYTES:
-        raise ModelFileError(_too_large(len(content), len(arrays)))
+    if len(content) > most:
+        raise ModelFileError(_too_large(len(content), len(arrays), most))
     return content
 
 
-def decode(content: bytes) -> tuple[Header, Arrays]:
-    """The header and the arrays of a file, all of it checked.
+def most_bytes(form: str) -> int:
+    """Size of the largest file of a format that is written or read."""
+    return MAX_SITUATION_BYTES if form == SITUATIONS else MAX_BYTES
+
+
+def decode(content: bytes, form: str = FORMAT) -> tuple[Header, Arrays]:
+    """The header and the arrays of a file of the format ``form``, all of it checked.
 
     Raises:
         ModelFileError: anything at all is wrong with it; the message says what.
     """
-    if len(content) > MAX_BYTES:
-        raise ModelFileError(_too_large(len(content), None))
+    most = most_bytes(form)
+    if len(content) > most:
+        raise ModelFileError(_too_large(len(content), None, most))
     try:
         arrays = _members(content)
     except _BROKEN as error:
         raise ModelFileError(f"it is damaged or no model file ({error})") from None
-    header = _header(arrays.pop(_HEADER, None))
+    header = _header(arrays.pop(_HEADER, None), form)
     if header.arrays != {name: _described(array) for name, array in arrays.items()}:
         raise ModelFileError("its arrays are not those that its header names")
     return header, arrays
@@ -227,15 +249,15 @@ def _array(content: bytes) -> npt.NDArray[Any]:
     return np.ndarray(shape, dtype, bytearray(body), order=order)
 
 
-def _header(raw: npt.NDArray[Any] | None) -> Header:
+def _header(raw: npt.NDArray[Any] | None, form: str) -> Header:
     if raw is None or raw.dtype != np.uint8 or raw.ndim != 1:
         raise ModelFileError("it has no header")
     text = raw.tobytes()
     try:
         found = msgspec.json.decode(text, type=_Format).format
-        if found != FORMAT:
+        if found != form:
             raise ModelFileError(
-                f"its format is {found!r}, and this version ({__version__}) reads {FORMAT!r}"
+                f"its format is {found!r}, and this version ({__version__}) reads {form!r}"
             )
         return msgspec.json.decode(text, type=Header)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
@@ -251,9 +273,9 @@ def _good_name(name: str) -> bool:
     return fits and name.isascii() and name.isprintable()
 
 
-def _too_large(size: int, arrays: int | None) -> str:
+def _too_large(size: int, arrays: int | None, most: int) -> str:
     many = "" if arrays is None else f" in {arrays} arrays"
-    return f"it has {size / 2**20:.1f} MiB{many}; at most {MAX_BYTES >> 20} MiB are kept"
+    return f"it has {size / 2**20:.1f} MiB{many}; at most {most >> 20} MiB are kept"
 
 
 def _finite(value: float) -> float | None:

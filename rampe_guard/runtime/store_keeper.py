@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from functools import partial
 from types import TracebackType
 from typing import Any, Protocol, Self
 
@@ -16,12 +17,14 @@ import numpy as np
 import numpy.typing as npt
 
 from rampe_guard import wire
+from rampe_guard.core.situation_memory import SituationMemory
 from rampe_guard.core.types import Category, FloatArray
 from rampe_guard.errors import ModelFileError
 from rampe_guard.runtime.say import Sayer
 from rampe_guard.runtime.store import ModelFile, model_path
-from rampe_guard.runtime.store_format import Header, decode, header_of, misfit
+from rampe_guard.runtime.store_format import Header, decode, encode, header_of, misfit
 from rampe_guard.runtime.store_saver import Save, Saver
+from rampe_guard.runtime.store_situations import SituationKeeper
 from rampe_guard.settings import Site
 
 _END_S = 1.2
@@ -120,13 +123,16 @@ class Keeper:
         self._header = header_of(site, limits)
         self._file: ModelFile | None = None
         self._learner: Learner | None = None
-        self._saver: Saver | None = None
+        self._saver: Saver[Mapping[Category, int]] | None = None
+        self._situations = SituationKeeper(site, limits, say)
         self._due_s = 0.0
         self._unkept: str | None = None
         self._said: str | None = None
 
-    def begin(self, learner: Learner, now_s: float) -> None:
-        """Recall what was learned before, and keep ``learner`` from now on."""
+    def begin(
+        self, learner: Learner, now_s: float, situations: SituationMemory | None = None
+    ) -> None:
+        """Recall what was learned before, and keep ``learner`` and ``situations`` from now on."""
         who = f"operator {self._site.operator!r}"
         if not self._site.memory.enabled:
             self._say.info(f"memory is off: {who} is learned anew, and nothing is kept")
@@ -151,18 +157,23 @@ class Keeper:
             self._learner = learner
             self._saver = Saver(file, dict(learner.categories))
             self._due_s = now_s + self._site.memory.save_every_s
+        if situations is not None:
+            self._situations.begin(file.path, situations, now_s)
 
     def keep(self, now_s: float) -> None:
         """Have saved what was learned since the last save, if it is time; never waits."""
         if self._saver is not None and now_s >= self._due_s:
             self._due_s = now_s + self._site.memory.save_every_s
             self._save(self._saver)
+        self._situations.keep(now_s)
 
     def reasons(self) -> tuple[wire.Reason, ...]:
         """Why what is learned is not kept, for the heartbeat; a change is said on the log."""
         problem = self._unkept
         if problem is None and self._saver is not None:
             problem = self._saver.problem
+        if problem is None:
+            problem = self._situations.problem
         text = None if problem is None else f"what is learned is not kept: {problem}"
         if text != self._said:
             self._said = text
@@ -174,6 +185,12 @@ class Keeper:
 
     def close(self) -> None:
         """Save what was learned since the last save; at most `_END_S`."""
+        end_s = time.monotonic() + _END_S
+        self._situations.save()  # meanwhile it writes
+        self._close_models()
+        self._situations.close(max(end_s - time.monotonic(), 0.0))
+
+    def _close_models(self) -> None:
         file, saver = self._file, self._saver
         self._saver = None
         if saver is not None and file is not None:
@@ -188,12 +205,12 @@ class Keeper:
         if file is not None:
             file.release()
 
-    def _save(self, saver: Saver) -> None:
+    def _save(self, saver: Saver[Mapping[Category, int]]) -> None:
         if self._learner is not None and (counts := dict(self._learner.categories)) != saver.taken:
             header = counted(self._header, self._learner)
             # copies: the learner goes on while they are written
             arrays = {name: a.copy() for name, a in self._learner.snapshot().items()}
-            saver.give(Save(header, arrays, counts))
+            saver.give(Save(partial(encode, header, arrays), counts))
 
     def _refuse(self, file: ModelFile, error: ModelFileError) -> None:
         """A file that cannot be used is never overwritten: it is moved, or we do not write."""

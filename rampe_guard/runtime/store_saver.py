@@ -3,52 +3,53 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Generic, TypeVar
 
-import numpy.typing as npt
-
-from rampe_guard.core.types import Category
 from rampe_guard.errors import ModelFileError
 from rampe_guard.runtime.store import ModelFile
-from rampe_guard.runtime.store_format import Header, encode
+
+_Mark = TypeVar("_Mark")
 
 
 @dataclass(frozen=True, slots=True)
-class Save:
-    """One state of the models: header, arrays, and occurrences by category to tell it by."""
+class Save(Generic[_Mark]):
+    """One state of what was learned.
 
-    header: Header
-    arrays: Mapping[str, npt.NDArray[Any]]
-    counts: Mapping[Category, int]
+    Attributes:
+        content: makes the bytes of the file, in the saver's thread.
+        mark: what the state is told by.
+    """
+
+    content: Callable[[], bytes]
+    mark: _Mark
 
 
-class Saver:
+class Saver(Generic[_Mark]):
     """Writes the newest `Save` that it was given; two never at once, older ones never after.
 
     Attributes:
-        taken: occurrences by category in the file as it is, or will be once what was given is
-            written.
+        taken: mark of the file as it is, or will be once what was given is written.
         problem: why the last save failed; None if it did not.
     """
 
-    def __init__(self, file: ModelFile, saved: Mapping[Category, int]) -> None:
+    def __init__(self, file: ModelFile, saved: _Mark) -> None:
         self.taken = self._saved = saved
         self.problem: str | None = None
         self._file = file
-        self._next: Save | None = None
+        self._next: Save[_Mark] | None = None
         self._over = False
         self._changed = threading.Condition()
         # a daemon: a disk that hangs must not keep the process from ending
         self._thread = threading.Thread(target=self._work, name="model-saver", daemon=True)
         self._thread.start()
 
-    def give(self, save: Save) -> None:
+    def give(self, save: Save[_Mark]) -> None:
         """Have it written as soon as the disk is free, instead of one that still waits."""
         with self._changed:
             self._next = save
-            self.taken = save.counts
+            self.taken = save.mark
             self._changed.notify()
 
     def finish(self, within_s: float) -> bool:
@@ -62,15 +63,15 @@ class Saver:
     def _work(self) -> None:
         while (save := self._wait()) is not None:
             try:
-                self._file.write(encode(save.header, save.arrays))
+                self._file.write(save.content())
             except (ModelFileError, ValueError, MemoryError) as error:
                 self.problem = str(error) or type(error).__name__
                 self.taken = self._saved  # to be given again
             else:
-                self._saved = save.counts
+                self._saved = save.mark
                 self.problem = None
 
-    def _wait(self) -> Save | None:
+    def _wait(self) -> Save[_Mark] | None:
         with self._changed:
             while self._next is None and not self._over:
                 self._changed.wait()

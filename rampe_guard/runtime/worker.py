@@ -18,6 +18,7 @@ from dataclasses import replace
 from rampe_guard import wire
 from rampe_guard.assembly import Machine
 from rampe_guard.core.events import AlertEvent, Event, PredictionEvent
+from rampe_guard.core.situation_memory import SituationMemory
 from rampe_guard.core.types import Inputs
 from rampe_guard.errors import MessageError, RefusedError
 from rampe_guard.runtime.canary_watch import CanaryWatch
@@ -70,7 +71,7 @@ class Worker:
         timed = TimedSweeper(machine.sweeper, self._pulse.sweep_ms)
         self._guard = machine.guard(start_s, boot, timed)
         self._keeper, self._canary, self._restarted = keeper, canary, restarted
-        keeper.begin(self._guard.rampe, start_s)
+        keeper.begin(self._guard.rampe, start_s, self._guard.situations)
         self._intake = Intake(bus, site, say)
         self._alerts = bus.outbox(f"{base}/alert", "rampe.alert.v1", urgent=True)
         self._predictions = bus.outbox(f"{base}/prediction", "rampe.prediction.v1")
@@ -155,6 +156,7 @@ class Worker:
             self._guard.lessons,
             extra,
             self._canary.trial(now_s),
+            _remembered(self._guard.situations),
         )
         self._beats.put(wire.encode(self._heartbeat))
         if connected is not self._connected:
@@ -214,6 +216,10 @@ def arrived(inputs: Inputs) -> bool:
     lists = (inputs.joystick, inputs.actuators, inputs.rejected)
     news = (inputs.canary, inputs.restarted)
     return any((*lists, inputs.objects, inputs.objects_rejected, inputs.enabled, *news))
+
+
+def _remembered(memory: SituationMemory) -> wire.Remembered:
+    return wire.Remembered(situations=memory.count, work_s=memory.hours * 3600.0)
 
 
 def _unix_s(now_s: float) -> float:

@@ -19,8 +19,9 @@ def check(model: SiteModel, problems: Problems) -> None:
     _keys(model, problems)
     _zenoh(model, problems)
     if model.alerts.caution_probability > model.alerts.warning_probability:
+        warning = model.alerts.warning_probability
         what = f"{model.alerts.caution_probability:g} is greater than warning_probability"
-        problems.add(("alerts", "caution_probability"), what, "give at most that probability")
+        problems.add(("alerts", "caution_probability"), what, f"give at most its {warning:g}")
     if model.alerts.expires_after_s < 2.0 * model.alerts.republish_s:
         what = f"{model.alerts.expires_after_s:g} s is less than two periods of republish_s"
         problems.add(

@@ -18,6 +18,7 @@ from rampe_guard.core.config import (
     GuardConfig,
     InputConfig,
     JoystickConfig,
+    NextConfig,
     PriorConfig,
     RampeConfig,
     StoppingConfig,
@@ -260,6 +261,7 @@ def _guard(model: SiteModel) -> GuardConfig:
         joystick=JoystickConfig(**model.joystick.model_dump()),
         rampe=RampeConfig(**rampe, prior=PriorConfig(**model.rampe.prior.model_dump())),
         stopping=StoppingConfig(**model.stopping.model_dump()),
+        next=NextConfig(**model.next.model_dump()),
         alerts=AlertConfig(**model.alerts.model_dump()),
         inputs=InputConfig(
             joystick_timeout_s=inputs.joystick.timeout_s,

@@ -13,6 +13,7 @@ from rampe_guard.settings.tuning_model import (
     AlertsModel,
     InputsModel,
     JoystickModel,
+    NextModel,
     RampeModel,
     StoppingModel,
     SweepModel,
@@ -214,6 +215,9 @@ class SiteModel(Model):
     joystick: JoystickModel = Field(default=JoystickModel(), description="The joystick processing.")
     rampe: RampeModel = Field(default=RampeModel(), description="The estimator.")
     stopping: StoppingModel = Field(default=StoppingModel(), description="The stopping forecast.")
+    next: NextModel = Field(
+        default=NextModel(), description="The forecast of what follows, from memory."
+    )
     sweep: SweepModel = Field(default=SweepModel(), description="The certified sweep.")
     alerts: AlertsModel = Field(default=AlertsModel(), description="The alarm logic.")
     memory: MemoryModel = Field(

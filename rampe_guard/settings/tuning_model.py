@@ -11,6 +11,7 @@ from rampe_guard.core.config import (
     Basis,
     InputConfig,
     JoystickConfig,
+    NextConfig,
     Observation,
     PriorConfig,
     RampeConfig,
@@ -24,6 +25,7 @@ _PRIOR = PriorConfig()
 _RAMPE = RampeConfig()
 _SWEEP = SweepConfig()
 _ALERTS = AlertConfig()
+_NEXT = NextConfig()
 _INPUTS = InputConfig()
 
 _Timeout = Annotated[float, Field(ge=0.02, le=60.0)]
@@ -119,6 +121,28 @@ class StoppingModel(Model):
     )
 
 
+class NextModel(Model):
+    """The forecast of what follows: how similar situations of the past went on."""
+
+    enabled: bool = Field(
+        default=_NEXT.enabled,
+        description="True if similar situations of this operator and machine are remembered and "
+        "asked; else only the motion under way speaks.",
+    )
+    horizon_s: Annotated[float, Field(ge=1.0, le=4.0)] = Field(
+        default=_NEXT.horizon_s, description="How far ahead the forecast looks [s]."
+    )
+    analogues: Annotated[int, Field(ge=1, le=32)] = Field(
+        default=_NEXT.analogues,
+        description="The number of similar situations that are asked: the 8 of '6 of 8 times'.",
+    )
+    situations: Annotated[int, Field(ge=10_000, le=1_000_000)] = Field(
+        default=_NEXT.situations,
+        description="The number of situations that are remembered, the oldest go first; a day of "
+        "work has about 200,000.",
+    )
+
+
 class SweepModel(Model):
     """Tolerances and budget of the certified sweep."""
 
@@ -138,13 +162,21 @@ class SweepModel(Model):
 class AlertsModel(Model):
     """When an alert is raised, held and given back."""
 
+    imminent_probability: Annotated[float, Field(gt=0.0, lt=1.0)] = Field(
+        default=_ALERTS.imminent_probability,
+        description="The smallest probability of contact at which it is imminent that the arm, let "
+        "go now, would still touch [-]; what no braking can avoid is imminent at any.",
+    )
     warning_probability: Annotated[float, Field(gt=0.0, lt=1.0)] = Field(
         default=_ALERTS.warning_probability,
-        description="The smallest probability of contact that warns [-].",
+        description="The smallest probability of contact that warns [-]: 0.2 warns at 20 %, that "
+        "is where one in five such situations ends in contact. Less warns earlier, and more "
+        "often in vain.",
     )
     caution_probability: Annotated[float, Field(gt=0.0, lt=1.0)] = Field(
         default=_ALERTS.caution_probability,
-        description="The smallest probability of contact that is a caution [-].",
+        description="The smallest probability of contact that is a caution [-]; at most "
+        "warning_probability.",
     )
     debounce_steps: _Steps = Field(
         default=_ALERTS.debounce_steps,

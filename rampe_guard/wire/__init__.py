@@ -16,6 +16,7 @@ from rampe_guard.wire.health import (
     ObjectInput,
     Quantiles,
     Reason,
+    Remembered,
 )
 from rampe_guard.wire.inputs import (
     ActuatorsMessage,
@@ -27,7 +28,7 @@ from rampe_guard.wire.inputs import (
     decode_joystick,
     decode_object_pose,
 )
-from rampe_guard.wire.prediction import Endpoint, Prediction, PredictionSweep
+from rampe_guard.wire.prediction import Endpoint, Prediction, PredictionSweep, Scenario
 from rampe_guard.wire.recorder import Recorder
 from rampe_guard.wire.schema import json_schemas
 from rampe_guard.wire.shelve import Shelve
@@ -55,6 +56,8 @@ __all__ = [
     "Quantiles",
     "Reason",
     "Recorder",
+    "Remembered",
+    "Scenario",
     "Shelve",
     "State",
     "SweepReply",

@@ -48,7 +48,13 @@ class Alert(Message, frozen=True, kw_only=True):
     ]
     zone: f.Zone
     link: f.Link
-    probability: f.Probability
+    probability: Annotated[
+        float | None,
+        Meta(
+            description="Calibrated probability of contact within the horizon (next.horizon_s in"
+            " the site file), 0 to 1, of all forecasts together; null where none is known."
+        ),
+    ]
     time_to_collision_s: f.TimeToCollision
     clearance_m: f.Clearance
     clearance_now_m: f.ClearanceNow
@@ -66,8 +72,23 @@ class Alert(Message, frozen=True, kw_only=True):
         f.ByActuator | None, Meta(description="Expected displacement by actuator [rad or m].")
     ]
     predicted_endpoint: Annotated[
-        f.ByActuator | None, Meta(description="Expected end position by actuator [rad or m].")
+        f.ByActuator | None,
+        Meta(
+            description="Expected end position by actuator [rad or m]; of source next: where the"
+            " likeliest of the similar situations that touched leads."
+        ),
     ]
+    similar_situations: Annotated[
+        int | None,
+        Meta(
+            description="Similar situations of the past that were asked; null where memory does"
+            " not speak (any source but next)."
+        ),
+    ] = None
+    similar_contacts: Annotated[
+        int | None,
+        Meta(description="Those of them that went on to touch the zone; null as above."),
+    ] = None
     stamp: f.Stamp
     published_unix_s: f.Published
     input_age_s: Annotated[

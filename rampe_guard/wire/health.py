@@ -75,6 +75,13 @@ class CanaryTrial(Message, frozen=True, kw_only=True):
     age_s: Annotated[float, Meta(description="Age of the newest trial [s].")]
 
 
+class Remembered(Message, frozen=True, kw_only=True):
+    """What is remembered of how situations went on."""
+
+    situations: Annotated[int, Meta(description="Situations remembered.")]
+    work_s: Annotated[float, Meta(description="Time of work that they span [s].")]
+
+
 class Heartbeat(Message, frozen=True, kw_only=True):
     """Health of the guard, sent from its worker loop."""
 
@@ -114,6 +121,9 @@ class Heartbeat(Message, frozen=True, kw_only=True):
         dict[str, int],
         Meta(description="Finished primitives since the boot: learned, or by why they were not."),
     ]
+    memory: Annotated[
+        Remembered | None, Meta(description="The memory of situations; null if it is unknown.")
+    ] = None
     drops: Annotated[
         int | None, Meta(description="Messages lost to full queues since the boot; null unknown.")
     ]

@@ -23,7 +23,10 @@ class PredictionSweep(Message, frozen=True, kw_only=True):
     contact_point_m: f.Point
     clearance_m: f.Clearance
     clearance_now_m: f.ClearanceNow
-    probability: f.Probability
+    probability: Annotated[
+        float | None,
+        Meta(description="Probability of contact by this forecast, 0 to 1; null: none is known."),
+    ]
     time_to_collision_s: f.TimeToCollision
 
 
@@ -33,6 +36,19 @@ class Endpoint(Message, frozen=True, kw_only=True):
     position: Annotated[f.ByActuator, Meta(description="End position by actuator [rad or m].")]
     share: Annotated[
         float, Meta(ge=0.0, le=1.0, description="Share of the occurrences that ended there.")
+    ]
+
+
+class Scenario(Message, frozen=True, kw_only=True):
+    """One way on from here, as similar situations of the past went on."""
+
+    share: Annotated[
+        float, Meta(ge=0.0, le=1.0, description="Weight among all ways: how alike they began.")
+    ]
+    count: Annotated[int, Meta(description="Similar situations that went on so.")]
+    duration_s: Annotated[float, Meta(description="How far ahead it leads [s].")]
+    endpoint: Annotated[
+        f.ByActuator, Meta(description="Position to which it leads, by actuator [rad or m].")
     ]
 
 
@@ -91,5 +107,9 @@ class Prediction(Message, frozen=True, kw_only=True):
     sweeps: Annotated[
         tuple[PredictionSweep, ...], Meta(description="Results by forecast and zone.")
     ]
+    scenarios: Annotated[
+        tuple[Scenario, ...],
+        Meta(description="Ways on from memory, the likeliest first; empty where it is new here."),
+    ] = ()
     stamp: f.Stamp
     published_unix_s: f.Published

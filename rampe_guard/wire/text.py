@@ -22,6 +22,7 @@ def alert_text(
     source: str = "intent",
     *,
     machine_off: bool = False,
+    times: tuple[int, int] | None = None,
 ) -> str:
     """Text such as ``bucket → cab-wall in 1.4 s``.
 
@@ -32,6 +33,7 @@ def alert_text(
         level: "clear", "caution", "warning" or "imminent".
         source: of the alert.
         machine_off: it is suppressed, since the machine is switched off.
+        times: how many of how many similar situations touched; None where memory does not speak.
     """
     link, zone = _line(link or "arm"), _line(zone or "obstacle")
     if source == "system":
@@ -42,7 +44,8 @@ def alert_text(
         return _pair(link, " clear of ", zone, " now")
     if source == "contact":
         return _pair(link, " at ", zone, " now")
-    return _pair(link, _ARROW, zone, _when(time_to_collision_s))
+    why = "" if times is None else f", {times[0]} of {times[1]} times"
+    return _pair(link, _ARROW, zone, _when(time_to_collision_s) + why)
 
 
 def _system(reason: str, level: str, *, machine_off: bool) -> str:

@@ -35,6 +35,7 @@ DIMENSIONLESS = {
     "axes", "category", "borrowed_from", "quaternion_xyzw", "dof",
     "probability", "share", "contact_fraction",
     "seq", "tick", "observations", "accepted", "rejected", "primitives", "drops", "count",
+    "situations", "similar_situations", "similar_contacts",
     "files", "messages", "waiting", "dropped",
 }  # fmt: skip
 SECONDS = {"stamp"}

@@ -15,6 +15,7 @@ from rampe_guard.core.config import (
     GuardConfig,
     InputConfig,
     JoystickConfig,
+    NextConfig,
     PriorConfig,
     RampeConfig,
     StoppingConfig,
@@ -125,7 +126,8 @@ operator: Anna Müller
 memory: {enabled: false, directory: ../models, save_every_s: 5}
 stopping: {reaction_s: 0.5}
 sweep: {tolerance_m: 1e-3, max_queries: 100}
-alerts: {warning_probability: 0.6, debounce_steps: 3}
+next: {horizon_s: 3, analogues: 16, situations: 50000}
+alerts: {warning_probability: 0.6, imminent_probability: 0.4, debounce_steps: 3}
 log: {time: {column: ms, scale: 0.001}, joystick: {swing: a, boom: b, bucket: c, thumb: d},
       actuators: {swing: e, boom: {column: cm, scale: 0.01, offset: -1}, bucket: f, thumb: g}}
 scene: scene.yaml""",
@@ -150,7 +152,10 @@ scene: scene.yaml""",
     assert guard.rampe == RampeConfig(n_init=4, forgetting=0.99, prior=prior)
     assert guard.stopping == StoppingConfig(0.5)
     assert site.sweep == SweepConfig(tolerance_m=1e-3, max_queries=100)
-    assert guard.alerts == AlertConfig(warning_probability=0.6, debounce_steps=3)
+    assert guard.next == NextConfig(horizon_s=3.0, analogues=16, situations=50_000)
+    assert guard.alerts == AlertConfig(
+        warning_probability=0.6, imminent_probability=0.4, debounce_steps=3
+    )
     assert site.log is not None
     assert site.log.time == ColumnMap("ms", 0.001)
     assert site.log.actuators["boom"] == ColumnMap("cm", 0.01, -1)
@@ -263,6 +268,11 @@ def test_mistake_is_named_with_line_key_value_and_remedy(
         ("memory: {directory: ~nobody-here/a}", "begins with a home that does not exist"),
         ("stopping:", "stopping: nothing is not a mapping"),
         ("alerts: {caution_probability: 0.9}", "0.9 is greater than warning_probability"),
+        ("alerts: {warning_probability: 0.05}", "0.1 is greater than warning_probability; give at"),
+        ("alerts: {imminent_probability: 1}", "alerts.imminent_probability: 1 is not less than 1"),
+        ("next: {horizon_s: 5}", "next.horizon_s: 5 is greater than 4"),
+        ("next: {analogues: 33}", "next.analogues: 33 is greater than 32"),
+        ("next: {situations: 9999}", "next.situations: 9999 is less than 10000"),
         ("alerts: {republish_s: 0.6}", "expires_after_s: 1 s is less than two periods of republ"),
         ("alerts: {shelve_max_s: 31}", "alerts.shelve_max_s: 31 is greater than 30"),
         ("log: {time: t, joystick: {}, actuators: {}}", "has no column for swing, boom"),

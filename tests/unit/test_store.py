@@ -15,7 +15,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rampe_guard.errors import ModelFileError
-from rampe_guard.runtime import store
 from rampe_guard.runtime.store import ModelFile, model_path, safe_name
 from rampe_guard.runtime.store_format import decode, encode
 from rampe_guard.settings import load_site
@@ -245,21 +244,18 @@ def test_a_folder_that_cannot_be_made(tmp_path: Path) -> None:
         ModelFile(tmp_path / "file" / "anna.npz").lock()
 
 
-def test_what_is_no_regular_file_is_not_read(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_no_regular_file_is_not_read(tmp_path: Path) -> None:
     pipe, folder, large = (tmp_path / name for name in ("pipe.npz", "folder.npz", "large.npz"))
     os.mkfifo(pipe)
     folder.mkdir()
     large.write_bytes(b"12345")
-    monkeypatch.setattr(store, "MAX_BYTES", 4)
     for path, expected in (
         (pipe, "not a regular"),
         (folder, "not a regular"),
         (large, "too much for a model"),
     ):
         with pytest.raises(ModelFileError, match=expected):
-            ModelFile(path).read()
+            ModelFile(path, 4).read()
     loop = tmp_path / "loop.npz"
     loop.symlink_to(loop)
     with pytest.raises(ModelFileError, match="cannot be read: Too many levels"):

@@ -23,6 +23,8 @@ from rampe_guard.wire import (
     PredictionSweep,
     Quantiles,
     Reason,
+    Remembered,
+    Scenario,
     State,
     SweepReply,
     decode,
@@ -35,9 +37,9 @@ DESIGNED_ALERT = [
     "previous_level", "state", "inhibit", "quality", "zone", "link", "probability",
     "time_to_collision_s", "clearance_m", "clearance_now_m", "contact_point_m",
     "contact_fraction", "any_path", "category", "observations", "predicted_displacement",
-    "predicted_endpoint", "stamp", "published_unix_s", "input_age_s", "compute_ms",
-    "raised_unix_s", "changed_unix_s", "acked_by", "shelved_by", "shelved_until_unix_s",
-    "expires_after_s", "text",
+    "predicted_endpoint", "similar_situations", "similar_contacts", "stamp", "published_unix_s",
+    "input_age_s", "compute_ms", "raised_unix_s", "changed_unix_s", "acked_by", "shelved_by",
+    "shelved_until_unix_s", "expires_after_s", "text",
 ]  # fmt: skip
 
 ALERT = Alert(
@@ -65,6 +67,8 @@ ALERT = Alert(
     observations=12,
     predicted_displacement={"swing": 0.7},
     predicted_endpoint={"swing": 1.9},
+    similar_situations=8,
+    similar_contacts=6,
     stamp=12.34,
     published_unix_s=1.7e9,
     input_age_s=0.012,
@@ -106,6 +110,7 @@ PREDICTION = Prediction(
             time_to_collision_s=None,
         ),
     ),
+    scenarios=(Scenario(share=0.7, count=6, duration_s=2.5, endpoint={"swing": 1.9}),),
     stamp=None,
     published_unix_s=1.7e9,
 )
@@ -120,6 +125,7 @@ HEARTBEAT = Heartbeat(
     rates_hz=InputRates(joystick=None, actuators=50.0),
     accepted={"joystick": 0, "actuators": 10},
     rejected={"joystick": {"bad_json": 2}},
+    memory=Remembered(situations=200_000, work_s=28_800.0),
     objects=(
         ObjectInput(
             name="truck",

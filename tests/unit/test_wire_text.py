@@ -30,6 +30,17 @@ def test_text(arguments: tuple[str | None, str | None, float | None], text: str)
     assert alert_text(*arguments) == text
 
 
+def test_memory_explains_itself_on_the_same_line() -> None:
+    text = alert_text("bucket", "wall", 1.42, "warning", "next", times=(6, 8))
+    assert text == "bucket → wall in 1.4 s, 6 of 8 times"
+    text = alert_text("l" * 64, "z" * 64, 3.91, "warning", "next", times=(30, 32))
+    assert len(text) == MAX_TEXT
+    assert text.endswith("… in 3.9 s, 30 of 32 times")
+    assert alert_text("bucket", "wall", None, "clear", "next", times=(0, 8)) == (
+        "bucket clear of wall now"
+    )
+
+
 def test_a_suppressed_alert_never_reads_as_clear() -> None:
     text = alert_text("bucket", "cab-wall", None, "clear", "intent", machine_off=True)
     assert text == "bucket → cab-wall: machine off"
