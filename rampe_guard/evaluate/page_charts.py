@@ -142,7 +142,7 @@ def timeline(log: LogLine) -> str:
         told = log.zones[zone]
         for start, end, verdict in told.alarms:
             first = max(start - log.start_s, 0.0)
-            last = min(end - log.start_s, log.duration_s)
+            last = log.duration_s if end is None else min(end - log.start_s, log.duration_s)
             if verdict == "false":
                 chart.box((first, base + 0.38), (last, base + 0.62), "false-alarm")
                 chart.mark((first, base + 0.8), "cross", "false-mark", 3.0)
