@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from rampe_guard.client.items import Alert, Protection
 from rampe_guard.core.scene import SELF_ZONE, ActuatorLimit
 from rampe_guard.dashboard.actuators import bars, basis
-from rampe_guard.dashboard.ghosts import intent_ghosts, stopping_ghosts
+from rampe_guard.dashboard.ghosts import intent_ghosts, next_ghost, stopping_ghosts
 from rampe_guard.dashboard.model import Model
 from rampe_guard.dashboard.picture import Banner, Card, Contact, Picture, Zone
 from rampe_guard.dashboard.sight import STALE_S, Sight
@@ -29,6 +29,7 @@ def compose(model: Model, sight: Sight) -> Picture:
     alerts = {a.zone: a for a in reversed(guard.alerts) if a.zone is not None}
     tones = _link_tones(model, () if lost else guard.alerts)
     limits = model.limits
+    onward = None if lost or sight.position_stale else next_ghost(model, sight)
     zone_tones = {name: tone_of(a) for name, a in alerts.items() if not lost}
     return Picture(
         machine=model.site.machine,
@@ -48,6 +49,8 @@ def compose(model: Model, sight: Sight) -> Picture:
         link_tones=tones,
         intent=None if lost or sight.position_stale else intent_ghosts(model, sight),
         stopping=None if lost or sight.position_stale else stopping_ghosts(model, sight),
+        next=None if onward is None else onward[0],
+        next_words="" if onward is None else onward[1],
         contact=None if lost else _contact(guard.active, sight.now_s),
         bars=bars(model, sight, zone_tones, lost=lost),
         basis=basis(sight, lost=lost),
@@ -200,6 +203,8 @@ def _card(sight: Sight, alert: Alert, *, lost: bool) -> Card:
         remarks.append(f"shelved by {alert.shelved_by or 'somebody'}")
     if alert.probability is not None:
         remarks.append(f"{alert.probability:.0%}")
+    if alert.similar_situations is not None and alert.similar_contacts is not None:
+        remarks.append(f"{alert.similar_contacts} of {alert.similar_situations} times")
     if alert.clearance_now_m is not None:
         remarks.append(f"now {alert.clearance_now_m:+.2f} m from the margin")
     return Card(

@@ -13,6 +13,7 @@ from rampe_guard.dashboard.sight import Sight
 
 INTENT = 4
 STOPPING = 2
+NEXT = 1
 _LEAST_SHARE = 0.004
 """A way shorter than this share of the travel is no way to look at."""
 
@@ -34,6 +35,23 @@ def intent_ghosts(model: Model, sight: Sight) -> FloatArray | None:
     each = INTENT // len(ways)
     shares = np.arange(1, each + 1) / each
     return model.poses(np.concatenate([q + shares[:, None] * way for way in ways]))
+
+
+def next_ghost(model: Model, sight: Sight) -> tuple[FloatArray, str] | None:
+    """Where the likeliest way on from memory leads (1, L, 4, 4), and why, in words.
+
+    None: memory knows no way, or the likeliest is to stay.
+    """
+    prediction, q = sight.prediction, sight.position
+    if prediction is None or q is None or not prediction.scenarios:
+        return None
+    way = prediction.scenarios[0]
+    end = np.array([way.endpoint.get(name, np.nan) for name in model.site.actuator_names])
+    if not np.isfinite(end).all() or _short(model, end - q):
+        return None
+    asked = sum(scenario.count for scenario in prediction.scenarios)
+    words = f"in {way.count} of {asked} similar situations you went on to here"
+    return model.poses(end[None]), words
 
 
 def stopping_ghosts(model: Model, sight: Sight) -> FloatArray | None:

@@ -61,6 +61,7 @@ def side(picture: Picture) -> str:
         for shown, colour, words in (
             (picture.intent is not None, "#4f8fd0", "where the operator usually goes"),
             (picture.stopping is not None, "#b07cd8", "where it stops if let go now"),
+            (picture.next is not None, "#c4a48c", escape(picture.next_words)),
         )
         if shown
     ]

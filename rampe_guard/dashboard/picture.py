@@ -143,6 +143,8 @@ class Picture:
         link_tones: how urgent the alerts are that name a link (L,).
         intent: ghosts on the way to the predicted end (k, L, 4, 4), or None.
         stopping: ghosts on the stopping path (k, L, 4, 4), or None.
+        next: ghost where the likeliest way on from memory leads (1, L, 4, 4), or None.
+        next_words: how often it did.
         contact: of the most urgent alert that knows it.
         bars: actuators.
         basis: what the prediction rests on.
@@ -164,6 +166,8 @@ class Picture:
     link_tones: tuple[Tone, ...]
     intent: FloatArray | None
     stopping: FloatArray | None
+    next: FloatArray | None
+    next_words: str
     contact: Contact | None
     bars: tuple[Bar, ...]
     basis: str

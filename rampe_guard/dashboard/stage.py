@@ -13,7 +13,7 @@ import viser
 from scipy.spatial.transform import Rotation
 
 from rampe_guard.core.types import FloatArray
-from rampe_guard.dashboard.ghosts import INTENT, STOPPING
+from rampe_guard.dashboard.ghosts import INTENT, NEXT, STOPPING
 from rampe_guard.dashboard.model import Model
 from rampe_guard.dashboard.picture import Contact, Picture, Zone
 from rampe_guard.dashboard.solids import Solid, Triangles
@@ -26,7 +26,9 @@ _FLAT: dict[bool, Rgb] = {True: (74, 72, 67), False: (150, 147, 138)}
 _FLAT_LOST: dict[bool, Rgb] = {True: (40, 40, 40), False: (128, 128, 128)}
 _INTENT: Rgb = (79, 143, 208)
 _STOPPING: Rgb = (176, 124, 216)
+_NEXT: Rgb = (196, 164, 140)
 _SEE_THROUGH = 0.22
+_FAINT = 0.14
 _SHELL = 0.10
 _SHEER = 0.15
 _GHOST_S = 0.08
@@ -94,6 +96,7 @@ class Stage:
         self._links = [self._link(i) for i in range(len(model.bodies))]
         self._intent = self._ghosts("intent", INTENT, _INTENT)
         self._stopping = self._ghosts("stopping", STOPPING, _STOPPING)
+        self._next = self._ghosts("next", NEXT, _NEXT, _FAINT)
         size = 0.02 * model.reach_m
         self._ball = Node(self._scene.add_icosphere("/contact", size, visible=False))
         self._words = Node(
@@ -116,6 +119,7 @@ class Stage:
             self._ghosts_s = picture.now_s
             self._show_ghosts(self._intent, picture.intent)
             self._show_ghosts(self._stopping, picture.stopping)
+            self._show_ghosts(self._next, picture.next)
         self._show_contact(picture.contact)
 
     def clear(self) -> None:
@@ -170,7 +174,9 @@ class Stage:
         )
         return Node(handle)
 
-    def _ghosts(self, name: str, count: int, colour: Rgb) -> list[tuple[int, Node]]:
+    def _ghosts(
+        self, name: str, count: int, colour: Rgb, opacity: float = _SEE_THROUGH
+    ) -> list[tuple[int, Node]]:
         nodes = []
         for index, body in enumerate(self._model.bodies):
             if body is None or not self._model.moving[index]:
@@ -181,7 +187,7 @@ class Stage:
                 batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
                 batched_positions=np.zeros((count, 3)),
                 batched_colors=colour,
-                opacity=_SEE_THROUGH,
+                opacity=opacity,
                 lod="off",
                 cast_shadow=False,
                 receive_shadow=False,

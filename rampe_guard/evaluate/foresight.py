@@ -295,10 +295,15 @@ def _lines(truth: Truth, trace: Trace, case: _Case) -> dict[str, form.ZoneLine]:
     for zone, contacts, outcome in zip(truth.zones, truth.contacts, judged, strict=True):
         alarms = zip(outcome.alarms.tolist(), outcome.verdict.tolist(), strict=True)
         lines[zone] = form.ZoneLine(
-            contacts=tuple((a, None if np.isinf(b) else b) for a, b in contacts.tolist()),
-            alarms=tuple((a, b, _VERDICTS[verdict]) for (a, b), verdict in alarms),
+            contacts=tuple((a, _or_none(b)) for a, b in contacts.tolist()),
+            alarms=tuple((a, _or_none(b), _VERDICTS[verdict]) for (a, b), verdict in alarms),
         )
     return lines
+
+
+def _or_none(end_s: float) -> float | None:
+    """An end that never came is none."""
+    return None if np.isinf(end_s) else end_s
 
 
 def _point(judged: Judged, threshold: float | None) -> form.Point:

@@ -116,7 +116,15 @@ def _trade_offs(report: Report) -> str:
 def _reliability(report: Report) -> str:
     if not report.reliability:
         return ""
-    figures = [(charts.reliability(of), f"Within {of.horizon_s:g} s") for of in report.reliability]
+    figures = []
+    for of in report.reliability:
+        title = f"Within {of.horizon_s:g} s"
+        if of.calibration_error is not None and of.calibration_error_told is not None:
+            title += (
+                f": calibration error {of.calibration_error:.3f}, where at least 2 % was said"
+                f" {of.calibration_error_told:.3f}"
+            )
+        figures.append((charts.reliability(of), title))
     return _section(
         "Do probabilities mean what they say?",
         "Of all the moments at which a contact was given this probability, so many led to one."

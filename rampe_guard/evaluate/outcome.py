@@ -55,28 +55,29 @@ def judge(contacts: FloatArray, alarms: FloatArray, window: tuple[float, float])
     contacts, alarms = contacts.reshape(-1, 2), alarms.reshape(-1, 2)
     alarms = alarms[(alarms[:, 0] <= end_s) & (alarms[:, 1] >= begin_s)]
     counted = (contacts[:, 0] > begin_s) & (contacts[:, 0] <= end_s)
+    # time of the window inside each contact and all before it
+    edges = np.clip(contacts, begin_s, end_s)
+    inside = np.cumsum(edges[:, 1] - edges[:, 0])
     return Outcome(
         entered_s=contacts[counted, 0],
         lead_s=_leads(contacts, alarms)[counted],
         alarms=alarms,
         verdict=_verdicts(contacts, alarms, end_s),
         window=window,
-        outside_s=float(np.diff(_outside(contacts, np.array([window]), window))[0, 0]),
-        alarmed_s=float(np.diff(_outside(contacts, alarms, window)).sum()),
+        outside_s=end_s - begin_s - (float(inside[-1]) if len(inside) else 0.0),
+        alarmed_s=_alarmed(edges, inside, alarms, window) if len(alarms) else 0.0,
     )
 
 
-def _outside(contacts: FloatArray, times: FloatArray, window: tuple[float, float]) -> FloatArray:
-    """Time of the window outside all contacts before each of some times [s], same shape."""
-    times = np.clip(times, *window)
-    if not len(contacts):
-        return times
-    edges = np.clip(contacts, *window)
-    inside = np.concatenate(([0.0], np.cumsum(edges[:, 1] - edges[:, 0])))
-    knots = np.column_stack((edges[:, 0], edges[:, 1])).ravel()
-    reached = np.column_stack((inside[:-1], inside[1:])).ravel()
-    before: FloatArray = np.interp(times, knots, reached)
-    return times - before
+def _alarmed(
+    edges: FloatArray, inside: FloatArray, alarms: FloatArray, window: tuple[float, float]
+) -> float:
+    """Time of the window outside all contacts that an alarm was on [s]."""
+    times = np.clip(alarms, *window)
+    if len(edges):
+        reached = np.column_stack((inside - (edges[:, 1] - edges[:, 0]), inside))
+        times = times - np.interp(times, edges.ravel(), reached.ravel())
+    return float((times[:, 1] - times[:, 0]).sum())
 
 
 def _leads(contacts: FloatArray, alarms: FloatArray) -> FloatArray:

@@ -68,7 +68,11 @@ def trade_off(report: Report, lead: str, against: str) -> str:
 def trade_off_legend() -> str:
     """Names of what `trade_off` draws."""
     entries: list[tuple[str, str, Mark]] = [
-        ("guard (mark: as the site has set it)", "guard", "disc"),
+        (
+            "guard (mark: as the site has set it; thin: with imminent_probability 1)",
+            "guard",
+            "disc",
+        ),
         *_FAMILIES.values(),
         *_OTHERS.values(),
     ]
@@ -89,11 +93,6 @@ def reliability(of: ReliabilityOf) -> str:
     for b in of.bins:
         chart.whiskers((b.said, b.happened), None, b.happened_interval, "guard thin")
         chart.mark((b.said, b.happened), "disc", "guard", 4.0)
-    if of.calibration_error is not None:
-        text = f"calibration error {of.calibration_error:.3f}"
-        if of.calibration_error_told is not None:
-            text += f"; of what was told, {of.calibration_error_told:.3f}"
-        chart.words((0.02, 0.95), text, "strong")
     return chart.render()
 
 
@@ -142,7 +141,7 @@ def timeline(log: LogLine) -> str:
         told = log.zones[zone]
         for start, end, verdict in told.alarms:
             first = max(start - log.start_s, 0.0)
-            last = min(end - log.start_s, log.duration_s)
+            last = log.duration_s if end is None else min(end - log.start_s, log.duration_s)
             if verdict == "false":
                 chart.box((first, base + 0.38), (last, base + 0.62), "false-alarm")
                 chart.mark((first, base + 0.8), "cross", "false-mark", 3.0)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -194,6 +195,7 @@ def spread(of: Pool) -> Spread:
     )
 
 
+@lru_cache(maxsize=16)
 def draws(blocks: int) -> FloatArray:
     """How often each block is drawn in each resample (RESAMPLES, blocks); always the same."""
     if not blocks:

@@ -169,10 +169,10 @@ class ZoneLine(Part, frozen=True, kw_only=True):
         Meta(description="Entry and leaving [s]; null: still in at the end."),
     ]
     alarms: Annotated[
-        tuple[tuple[float, float, str], ...],
+        tuple[tuple[float, float | None, str], ...],
         Meta(
-            description="Start and last cause [s] of each alarm of the guard at its operating"
-            " point, and what it was: true, false or undecided."
+            description="Start and end [s] of each alarm of the guard at its operating point"
+            " (null: still on at the end), and what it was: true, false or undecided."
         ),
     ]
 

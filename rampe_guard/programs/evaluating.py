@@ -24,7 +24,7 @@ from rampe_guard.evaluate.definitions import GUARD
 from rampe_guard.evaluate.foresight import report
 from rampe_guard.evaluate.foresight_page import page
 from rampe_guard.evaluate.prediction_plot import draw
-from rampe_guard.evaluate.report_model import Point, Report, report_bytes
+from rampe_guard.evaluate.report_model import Point, Report, Strict, report_bytes
 from rampe_guard.evaluate.stages import machine_of
 from rampe_guard.programs.evaluating_prediction import prediction_summary, prediction_title
 from rampe_guard.programs.fleet_file import read_fleet
@@ -198,31 +198,28 @@ def _table(made: Report) -> Table:
         "median\nlead",
         "missed",
         "on",
-        "strict:\nfalse",
-        "≥ 0.5 s",
-        "≥ 1.0 s",
     ):
         table.add_column(name, header_style="dim", justify="right", no_wrap=True)
     for name, forecast in made.forecasts.items():
         style = "bold" if name == GUARD else None
         table.add_row(name, *_cells(forecast.operating_point), style=style)
+    strict = made.forecasts[GUARD].operating_point.strict
+    if strict is not None:
+        table.add_row(f"{GUARD}, strict", *_cells(strict))
     for level, of in made.published.items():
         table.add_row(f"published, {level} or above", *_cells(of.total), style="dim")
     return table
 
 
-def _cells(at: Point) -> tuple[str, ...]:
+def _cells(at: Point | Strict) -> tuple[str, ...]:
     shares = (at.warned_0_5_s, at.warned_1_0_s, at.warned_1_5_s)
-    lead, strict = at.median_lead_s, at.strict
+    lead = at.median_lead_s
     return (
         _rate(at.false_per_min_per_zone),
         *map(_share, shares),
         "—" if lead is None else f"{lead:.2f} s",
         str(at.missed),
         _share(at.alarmed_share),
-        "" if strict is None else _rate(strict.false_per_min_per_zone),
-        "" if strict is None else _share(strict.warned_0_5_s),
-        "" if strict is None else _share(strict.warned_1_0_s),
     )
 
 

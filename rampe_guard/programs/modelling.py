@@ -17,14 +17,29 @@ from rich.text import Text
 from rampe_guard.collision import load_arm
 from rampe_guard.core.intention import Intention
 from rampe_guard.core.rampe import CategoryRow
-from rampe_guard.core.types import Category
+from rampe_guard.core.types import Category, FloatArray
 from rampe_guard.errors import ModelFileError
-from rampe_guard.runtime.store import SUFFIX, ModelFile, model_folder, model_path
-from rampe_guard.runtime.store_format import Arrays, Header, decode, header_of
+from rampe_guard.runtime.store import (
+    SUFFIX,
+    ModelFile,
+    model_folder,
+    model_path,
+    situations_file,
+)
+from rampe_guard.runtime.store_format import (
+    Arrays,
+    Header,
+    decode,
+    header_of,
+    misfit,
+    situations_header,
+)
 from rampe_guard.runtime.store_keeper import recall
+from rampe_guard.runtime.store_situations import decode_situations
 from rampe_guard.settings import Site, for_operator, load_site
 
 _MOST_NAMED = 20
+_REMEMBERED = "{path}: {why}; a guard would set this file aside and remember nothing"
 _SIGN = {-1: "-", 1: "+"}
 
 
@@ -37,6 +52,17 @@ class _Model:
     header: Header
     arrays: Arrays
     rows: tuple[CategoryRow, ...]
+    situations: _Situations | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Situations:
+    """The kept situations beside it."""
+
+    path: Path
+    size: int
+    count: int
+    hours: float
 
 
 def show_model(site_path: str, operator: str | None, console: Console) -> int:
@@ -60,6 +86,7 @@ def show_model(site_path: str, operator: str | None, console: Console) -> int:
         ("saved", f"{saved} by rampe-guard {header.version}"),
         ("file", str(model.path)),
         ("size", f"{model.size:,} bytes, {header.format}"),
+        ("situations", _situations_text(model.situations)),
     ):
         facts.add_row(name, Text(value))
     console.print(facts)
@@ -92,6 +119,13 @@ def export_model(site_path: str, operator: str | None) -> bytes:
                 }
                 for row in model.rows
             ],
+            "situations": None
+            if model.situations is None
+            else {
+                "count": model.situations.count,
+                "work_s": model.situations.hours * 3600.0,
+                "file": str(model.situations.path),
+            },
             "arrays": {
                 name: {"dtype": array.dtype.str, "shape": array.shape, "values": array.tolist()}
                 for name, array in model.arrays.items()
@@ -115,16 +149,16 @@ def reset_model(site_path: str, operator: str | None, console: Console, *, sure:
     site = for_operator(load_site(site_path), operator)
     path = model_path(site)
     who = f"operator {site.operator!r} on {site.machine} at {site.name}"
-    file = ModelFile(path)
+    file, remembered = ModelFile(path), situations_file(path)
     if path.parent.is_dir():
-        with file:
-            models = file.all_models()
+        with file, remembered:
+            models = [*file.all_models(), *remembered.all_models()]
             if models and not sure and sys.stdin.isatty():
                 raise ModelFileError(
                     f"this forgets all that was learned of {who} ({_listed(models)});"
                     " give --yes to do it"
                 )
-            if file.delete():
+            if [*file.delete(), *remembered.delete()]:
                 console.print(Text(f"forgotten: {who}; deleted {_listed(models)}"))
                 return 0
     console.print(Text(f"nothing is kept of {who}: there is no {path}"))
@@ -152,13 +186,38 @@ def _load(site: Site) -> _Model:
         raise ModelFileError(
             f"{path}: {error}; a guard would set this file aside and start with nothing learned"
         ) from None
-    return _Model(path, len(content), *decode(content), tuple(rampe.table()))
+    found = _situations(site, limits, path)
+    return _Model(path, len(content), *decode(content), tuple(rampe.table()), found)
+
+
+def _situations(site: Site, limits: FloatArray, model: Path) -> _Situations | None:
+    """What is kept beside a model; None if there is nothing."""
+    file = situations_file(model)
+    try:
+        content = file.read()
+        if content is None:
+            return None
+        header, arrays = decode_situations(content)
+    except ModelFileError as error:
+        raise ModelFileError(_REMEMBERED.format(path=file.path, why=error)) from None
+    if reason := misfit(header, situations_header(site, limits)):
+        raise ModelFileError(_REMEMBERED.format(path=file.path, why=reason))
+    clock = arrays["next_clock"]
+    hours = float(clock[-1] - clock[0]) / 3600.0 if len(clock) else 0.0
+    return _Situations(file.path, len(content), header.occurrences, hours)
+
+
+def _situations_text(found: _Situations | None) -> str:
+    if found is None:
+        return "none"
+    return f"{found.count:,} of {found.hours:.1f} h of work, {found.size:,} bytes in {found.path}"
 
 
 def _operators(site: Site) -> list[str]:
     """Of whom there is a model of this machine."""
     found = []
-    for path in sorted(model_folder(site).glob(f"*{SUFFIX}"))[:_MOST_NAMED]:
+    models = (p for p in model_folder(site).glob(f"*{SUFFIX}") if "." not in p.stem)
+    for path in sorted(models)[:_MOST_NAMED]:
         with contextlib.suppress(ModelFileError):
             content = ModelFile(path).read()
             if content is not None:

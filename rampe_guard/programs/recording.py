@@ -17,11 +17,11 @@ from rampe_guard.recording.recorded_site import absolute_words
 from rampe_guard.recording.recorder import Ended, Recorder
 from rampe_guard.recording.series import Rotation, Series
 from rampe_guard.recording.taps import Clock, Taps
-from rampe_guard.recording.writer import FILES, METADATA, MODEL, Entry, Head
+from rampe_guard.recording.writer import FILES, METADATA, MODEL, SITUATIONS, Entry, Head
 from rampe_guard.runtime.connecting import connect_to
 from rampe_guard.runtime.say import Sayer
 from rampe_guard.runtime.stopping import StopFlag
-from rampe_guard.runtime.store import ModelFile, model_path
+from rampe_guard.runtime.store import ModelFile, model_path, situations_file
 from rampe_guard.runtime.zenoh_io import Bus
 from rampe_guard.settings import Site, for_operator, load_site
 
@@ -164,10 +164,13 @@ class _Beginning:
         """What is kept of the operator now, if anything."""
         if not self._site.memory.enabled:
             return {}
+        found = {}
         try:
             path = model_path(self._site)
-            content = ModelFile(path).read()
+            for prefix, file in ((MODEL, ModelFile(path)), (SITUATIONS, situations_file(path))):
+                content = file.read()
+                if content is not None:
+                    found[prefix + file.path.name] = content
         except ModelFileError as error:
             self._say.warn("model", f"what was learned is not attached: {error}")
-            return {}
-        return {} if content is None else {MODEL + path.name: content}
+        return found

@@ -19,13 +19,19 @@ from rampe_guard.evaluate.tally import Tally
 from rampe_guard.programs.scoring import closing_table
 from rampe_guard.recording import Log, McapLog, McapReading, is_mcap, open_log
 from rampe_guard.recording.compare import ZoneComparison, changes, compare
-from rampe_guard.recording.recorded_site import learned_before, other_files, recorded_site
+from rampe_guard.recording.recorded_site import (
+    learned_before,
+    other_files,
+    recorded_site,
+    remembered_before,
+)
 from rampe_guard.runtime.loading import load_telling
 from rampe_guard.runtime.messages import Scribe
 from rampe_guard.runtime.replay import replay
 from rampe_guard.runtime.stopping import StopFlag
-from rampe_guard.runtime.store_format import header_of
+from rampe_guard.runtime.store_format import header_of, situations_header
 from rampe_guard.runtime.store_keeper import recall
+from rampe_guard.runtime.store_situations import recall_situations
 from rampe_guard.settings import Site, load_site
 
 BOOT_ID = "replay"
@@ -107,14 +113,22 @@ def tell_warnings(site: Site, log: Log) -> None:
 
 def _recall(machine: Machine, log: McapLog, guard: Guard) -> None:
     """Begin with what the recorded guard's memory held."""
-    content = learned_before(log.reading)
-    if content is None:
-        return
+    site, limits = machine.site, machine.arm.limits
+    model, situations = learned_before(log.reading), remembered_before(log.reading)
     try:
-        recall(content, header_of(machine.site, machine.arm.limits), guard.rampe)
+        if model is not None:
+            recall(model, header_of(site, limits), guard.rampe)
     except ModelFileError as error:
-        text = f"what was learned before the recording is not used: {error}"
-        print(f"warning: {log.path}: {text}", file=sys.stderr)  # noqa: T201
+        _not_used(log, f"what was learned before the recording is not used: {error}")
+    try:
+        if situations is not None:
+            recall_situations(situations, situations_header(site, limits), guard.situations)
+    except ModelFileError as error:
+        _not_used(log, f"what was remembered before the recording is not used: {error}")
+
+
+def _not_used(log: McapLog, why: str) -> None:
+    print(f"warning: {log.path}: {why}", file=sys.stderr)  # noqa: T201
 
 
 def _lines(

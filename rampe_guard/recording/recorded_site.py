@@ -15,7 +15,7 @@ from rampe_guard.errors import LogError, MessageError
 from rampe_guard.recording.bundle import Bundle, unpack
 from rampe_guard.recording.channels import role_of
 from rampe_guard.recording.reader import McapReading
-from rampe_guard.recording.writer import FILES, METADATA, MODEL
+from rampe_guard.recording.writer import FILES, METADATA, MODEL, SITUATIONS
 from rampe_guard.settings import Site, for_operator, load_site
 
 
@@ -49,6 +49,11 @@ def recorded_site(reading: McapReading) -> Iterator[Site]:
 def learned_before(reading: McapReading) -> bytes | None:
     """The model that was kept when the recording began; None if none was."""
     return next(iter(reading.contents(MODEL).values()), None)
+
+
+def remembered_before(reading: McapReading) -> bytes | None:
+    """The situations that were kept when the recording began; None if none were."""
+    return next(iter(reading.contents(SITUATIONS).values()), None)
 
 
 def other_files(reading: McapReading) -> tuple[str, ...]:

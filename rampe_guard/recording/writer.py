@@ -27,6 +27,8 @@ FILES: Final = "files/"
 """Begins the names of attachments that are files of the site."""
 MODEL: Final = "model/"
 """Begins the name of the attachment that is what was learned before."""
+SITUATIONS: Final = "situations/"
+"""Begins that of the situations that were remembered before."""
 _MAX_NS = 2**63 - 1
 _PRIVATE = 0o600
 """How a person works is nobody else's business."""

@@ -61,6 +61,8 @@ def _remark(alert: AlertView, now_s: float, *, stale: bool) -> str:
         time = "" if left_s is None else f", {left_s:.0f} s left"
         return f"shelved by {alert.shelved_by or 'someone'}{time}"
     words = [alert.source]
+    if alert.times is not None:
+        words = [f"{alert.source}: {alert.times[0]} of {alert.times[1]}"]
     if not alert.trusted:
         words.append("DOUBTFUL")
     if alert.gone:

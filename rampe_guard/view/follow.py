@@ -193,6 +193,7 @@ def alert_view(message: Alert, now_s: float, before: AlertView | None = None) ->
         shelved_by=message.shelved_by,
         shelved_for_s=None if until_s is None else until_s - message.published_unix_s,
         acked_by=message.acked_by,
+        times=_times(message),
     )
 
 
@@ -263,3 +264,8 @@ def _of(values: Mapping[str, float] | None, name: str) -> float | None:
 
 def _finite(limit: float | None) -> float | None:
     return None if limit is None or abs(limit) == float("inf") else limit
+
+
+def _times(message: Alert) -> tuple[int, int] | None:
+    met, asked = message.similar_contacts, message.similar_situations
+    return None if met is None or asked is None else (met, asked)

@@ -69,6 +69,7 @@ class AlertView:
         shelved_by: who shelved it.
         shelved_for_s: for how long from ``received_s`` on [s].
         acked_by: who acknowledged it.
+        times: how many of how many similar situations touched; None where memory is silent.
     """
 
     alert_id: str
@@ -92,6 +93,7 @@ class AlertView:
     shelved_by: str | None = None
     shelved_for_s: float | None = None
     acked_by: str | None = None
+    times: tuple[int, int] | None = None
 
     @property
     def flashes(self) -> bool:

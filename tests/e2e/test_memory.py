@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rampe_guard.runtime.store import situations_file
 from rampe_guard.settings import load_site
 from tests.support import processes
 from tests.support.ears import Ears, Heard
@@ -125,10 +126,16 @@ def test_what_was_learned_outlives_the_guard_and_goes_when_told(workplace: Workp
         assert guard.signal_and_wait(signal.SIGTERM) <= END_S
         assert guard.popen.returncode == 0
         assert _header(workplace.model())["occurrences"] == 6  # and in the end
+    situations = situations_file(workplace.model()).path
+    remembered = _header(situations)["occurrences"]
+    assert remembered > 10
 
     with workplace.guard() as guard:
         assert f"6 primitives of 2 categories known from {workplace.model()}" in guard.err
+        assert f"{remembered} situations of 0.0 h of work known from {situations}" in guard.err
         start_s = time.monotonic()
+        beat = workplace.ears.wait("heartbeat", lambda b: b["memory"] is not None, 5.0, start_s)
+        assert beat.body["memory"]["situations"] >= remembered
         workplace.rig.levers = (0.4 * last[0], 0.0, 0.0, 0.0)
         first = workplace.ears.wait("prediction", lambda b: b["event"] == "started", 5.0, start_s)
         workplace.rig.levers = HANDS_OFF
@@ -153,11 +160,16 @@ def test_what_was_learned_outlives_the_guard_and_goes_when_told(workplace: Workp
 
     exported = command("model", "export", site, state=workplace.state)
     model = json.loads(exported.stdout)
+    assert model["situations"]["count"] >= remembered  # the kill took only what was new
     assert model["header"]["occurrences"] == sum(r["occurrences"] for r in model["categories"]) == 7
     assert {tuple(r["category"]) for r in model["categories"]} == {(1, 0, 0, 0), (-1, 0, 0, 0)}
     for row in model["categories"]:
         assert row["mean_displacement"]["swing"] * row["category"][0] > 0.0
+    _forget(workplace)
 
+
+def _forget(workplace: Workplace) -> None:
+    site = workplace.site_path
     forgotten = command("model", "reset", site, state=workplace.state)
     assert forgotten.returncode == 0, forgotten.stderr
     assert f"deleted {workplace.model()}" in forgotten.stdout

@@ -9,7 +9,7 @@ import numpy as np
 from rampe_guard.settings import LogMapping, load_site
 from tests.support.processes import BENCH
 
-PERIOD_S = 0.05
+PERIOD_S = 0.1
 REST_S = 0.6
 
 

@@ -33,13 +33,18 @@ def write_wall_site(folder: Path, logs: Sequence[str | Path]) -> Path:
         lines.append(f"  - {{name: {name}-low, {wall}, below: {below:.6f}}}")
         lines.append(f"  - {{name: {name}-high, {wall}, above: {above:.6f}}}")
     (folder / "walls.yaml").write_text("\n".join(lines) + "\n", "utf-8")
+    return write_site(folder, "walls")
+
+
+def write_site(folder: Path, scene: str) -> Path:
+    """The bench excavator's site with the scene of that name, which is in ``folder``."""
     text = BENCH.read_text("utf-8")
     for old, new in (
         ("../../geometry", str(ROOT / "geometry")),
-        ("../scenes/bench.yaml", "walls.yaml"),
+        ("../scenes/bench.yaml", f"{scene}.yaml"),
     ):
         assert old in text, old
         text = text.replace(old, new)
-    path = folder / "walls-site.yaml"
+    path = folder / f"{scene}-site.yaml"
     path.write_text(text, "utf-8")
     return path

@@ -15,6 +15,7 @@ from rampe_guard.client.machine import MachineState
 from rampe_guard.core.scene import Box
 from rampe_guard.dashboard.compose import compose, countdown
 from rampe_guard.dashboard.ghosts import INTENT, STOPPING
+from rampe_guard.dashboard.markup import side
 from rampe_guard.dashboard.model import Model, load_model
 from rampe_guard.dashboard.picture import Picture
 from rampe_guard.dashboard.sight import Sight
@@ -302,3 +303,33 @@ def test_a_moving_object_is_where_it_was_seen_or_nobody_knows(model: Model) -> N
 )
 def test_no_more_time_is_promised_than_there_is(seconds: float | None, said: str) -> None:
     assert countdown(seconds) == said
+
+
+def test_memory_shows_where_its_likeliest_way_leads_and_how_often_it_did(model: Model) -> None:
+    start = dict(PREDICTION.start)
+    ways = tuple(
+        wire.Scenario(share=share, count=count, duration_s=2.5, endpoint={**start, "swing": swing})
+        for share, count, swing in ((0.8, 6, 0.3), (0.2, 2, 1.4))
+    )
+    seen = replace(sight(guard()), prediction=structs.replace(PREDICTION, scenarios=ways))
+    picture = compose(model, seen)
+    assert picture.next is not None
+    end = model.poses(np.array([[0.3, 0.065, 0.08, 0.03]]))
+    np.testing.assert_allclose(picture.next, end, atol=1e-9)
+    assert picture.next_words == "in 6 of 8 similar situations you went on to here"
+    assert picture.next_words in side(picture)
+    for unfit in (
+        replace(seen, prediction=PREDICTION),
+        replace(seen, now_s=102.0),
+        replace(seen, guard=guard(beat=None)),
+        replace(seen, position=np.array([0.3, *POSITION[1:]])),
+    ):
+        nothing = compose(model, unfit)
+        assert (nothing.next, nothing.next_words) == (None, "")
+        assert "similar situations" not in side(nothing)
+
+
+def test_an_alert_of_memory_says_in_how_many_times_it_came_to_contact(model: Model) -> None:
+    known = structs.replace(CRATE, source="next", similar_situations=8, similar_contacts=6)
+    assert "6 of 8 times" in compose(model, sight(guard(known))).cards[0].detail
+    assert "times" not in compose(model, sight(guard(CRATE))).cards[0].detail

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
 import io
 import json
 import re
@@ -17,6 +18,7 @@ import jsonschema  # type: ignore[import-untyped]
 import pytest
 
 from rampe_guard.cli import main
+from rampe_guard.errors import RampeGuardError
 from rampe_guard.evaluate import crew
 from rampe_guard.evaluate.baselines import DESCRIPTIONS
 from rampe_guard.evaluate.prediction import FORECASTERS
@@ -27,7 +29,7 @@ from rampe_guard.settings import load_site
 from tests.support.bench_log import PERIOD_S, write_log
 from tests.support.processes import BENCH, ROOT
 
-CYCLES = 6
+CYCLES = 4
 PRIMITIVES = 4 * CYCLES
 """Of each log; the last stroke of a log ends with its rest."""
 LOGS = ROOT.parent / "shared" / "data" / "excavator_logs"
@@ -114,10 +116,10 @@ def test_the_report_tells_how_early_and_how_often_in_vain(told: Told) -> None:
     jsonschema.validate(report, report_schema())
     assert report["zones"] == ["crate", "ceiling", "slew-left", "slew-right"]
     assert [log["log"] for log in report["logs"]] == ["day1.csv", "day2.csv"]
-    assert list(report["forecasts"]) == ["guard", *DESCRIPTIONS]
+    assert list(report["forecasts"]) == ["guard", "guard_sparing", *DESCRIPTIONS]
     lines = [zone for log in report["logs"] for zone in log["zones"].values()]
     crossings = sum(len(line["contacts"]) for line in lines)
-    assert report["crossings"] == crossings > 10  # none was there when a log began
+    assert report["crossings"] == crossings > 6  # none was there when a log began
     for name, forecast in report["forecasts"].items():
         at = forecast["operating_point"]
         assert at["crossings"] == crossings
@@ -128,7 +130,10 @@ def test_the_report_tells_how_early_and_how_often_in_vain(told: Told) -> None:
         assert sum(point["crossings"] for point in forecast["by_zone"].values()) == crossings
         assert sum(point["missed"] for point in forecast["by_log"].values()) == at["missed"]
         assert sum(lead is None for lead in forecast["leads_s"]) == at["missed"]
-        assert forecast["binary"] == (name not in {"guard", "rampe_primitive"})
+        assert forecast["binary"] == (name not in {"guard", "guard_sparing", "rampe_primitive"})
+        # an alarm that ends with its last cause is on for less of the time, and never warns more
+        assert at["strict"]["alarmed_share"] <= at["alarmed_share"]
+        assert at["strict"]["missed"] >= at["missed"]
     guard = report["forecasts"]["guard"]
     thresholds = [point["threshold"] for point in guard["curve"]]
     assert len(thresholds) >= 60
@@ -162,10 +167,15 @@ def test_the_page_needs_nothing_from_outside(told: Told) -> None:
     assert page.count("<svg") > 8
 
 
+def carried_known(told: Told) -> int:
+    known: int = told.found["total"]["primitives_known"]
+    return known
+
+
 def test_fresh_means_that_a_log_knows_nothing_of_those_before(told: Told, logs: list[str]) -> None:
     fresh = of_prediction(logs, fresh=True)
     carried = told.found
-    assert fresh["total"]["primitives_known"] == 2 * (PRIMITIVES - 4 * 5)
+    assert fresh["total"]["primitives_known"] == 0 < carried_known(told)
     assert fresh["logs"][0] == carried["logs"][0]  # the first knows nothing either way
     before, after = (found["logs"][1]["all"] for found in (fresh, carried))
     assert before["zero"] == after["zero"]
@@ -226,7 +236,8 @@ def test_a_log_without_a_stroke_is_refused(
     resting = lines[-1].split(",")
     still = [",".join([f"{PERIOD_S * k:.3f}", *resting[1:]]) for k in range(50)]
     path.write_text("\n".join([lines[0], *still]) + "\n", "utf-8")
-    assert main(["evaluate", str(BENCH), str(path), "--out", str(tmp_path / "out")]) == 2
+    out = str(tmp_path / "out")
+    assert main(["evaluate", str(BENCH), str(path), "--out", out, "--jobs", "1"]) == 2
     assert "still.csv: no complete primitive" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
@@ -242,10 +253,9 @@ def test_a_bad_log_is_refused_in_the_readers_words(
     assert not (tmp_path / "o").exists()
 
 
-@pytest.mark.parametrize("library", ["river", "matplotlib"])
-def test_a_missing_extra_is_named(library: str, logs: list[str], tmp_path: Path) -> None:
+def test_a_missing_extra_is_named(logs: list[str], tmp_path: Path) -> None:
     code = (
-        f"import sys; sys.modules[{library!r}] = None; from rampe_guard.cli import main;"
+        "import sys; sys.modules['river'] = None; from rampe_guard.cli import main;"
         " sys.exit(main(sys.argv[1:]))"
     )
     done = subprocess.run(
@@ -256,9 +266,16 @@ def test_a_missing_extra_is_named(library: str, logs: list[str], tmp_path: Path)
         cwd=ROOT,
     )
     assert done.returncode == 2
-    assert f"needs {library}" in done.stderr
+    assert "needs river" in done.stderr
     assert "rampe-guard[eval]" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_so_is_a_missing_library_of_plots(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib.axes", None)
+    monkeypatch.delitem(sys.modules, "rampe_guard.evaluate.prediction_plot")
+    with pytest.raises(RampeGuardError, match=r"needs matplotlib.*rampe-guard\[eval\]"):
+        importlib.import_module("rampe_guard.evaluate.prediction_plot")
 
 
 @pytest.mark.private_data

@@ -13,13 +13,16 @@ import pytest
 from rich.console import Console
 
 from rampe_guard.core.intention import Intention
+from rampe_guard.core.situation import Likeness
+from rampe_guard.core.situation_memory import SituationMemory
 from rampe_guard.core.types import Category
 from rampe_guard.errors import ModelFileError, RampeGuardError
 from rampe_guard.programs.modelling import export_model, reset_model, show_model
 from rampe_guard.runtime.say import Sayer
-from rampe_guard.runtime.store import ModelFile, model_path
-from rampe_guard.runtime.store_format import decode
+from rampe_guard.runtime.store import ModelFile, model_path, situations_file
+from rampe_guard.runtime.store_format import decode, situations_header
 from rampe_guard.runtime.store_keeper import Keeper
+from rampe_guard.runtime.store_situations import encode_situations
 from rampe_guard.settings import for_operator, load_site
 from tests.support.models import bench_limits
 from tests.support.processes import BENCH
@@ -47,6 +50,19 @@ def teach(operator: str | None = None) -> Path:
         for _ in range(2):
             rampe.observe(SWING, START, np.array([0.3, 0.0, 0.0, 0.0]))
     return model_path(site)
+
+
+def remember(situations: int) -> Path:
+    """So many situations, kept as a guard keeps them; returns the file."""
+    site = load_site(BENCH)
+    limits = bench_limits(site)
+    file = situations_file(model_path(site))
+    memory = SituationMemory(Likeness(np.ones(4)), 4, 2.5, 10_000)
+    for k in range(situations):
+        memory.see(0.1 * k, np.full(4, 0.1 * k), np.full(12, 0.1 * k))
+    with file:
+        file.write(encode_situations(situations_header(site, limits), memory.pieces()))
+    return file.path
 
 
 def shown(action: Callable[[Console], int]) -> str:
@@ -150,6 +166,30 @@ def test_reset_deletes_one_operator_and_says_what() -> None:
     assert not path.exists()
     assert other.exists()
     assert [p.name for p in path.parent.iterdir() if p.name.startswith("operator")] == []
+
+
+def test_situations_are_shown_and_forgotten_with_the_model() -> None:
+    path = teach()
+    kept = remember(60)
+    text = shown(lambda c: show_model(SITE, None, c))
+    assert f"60 of 0.0 h of work, {kept.stat().st_size:,} bytes in {kept}" in text
+    found = json.loads(export_model(SITE, None))["situations"]
+    assert found == {"count": 60, "work_s": pytest.approx(5.9), "file": str(kept)}
+    text = shown(lambda c: reset_model(SITE, None, c, sure=False))
+    assert f"deleted {path}, {kept}" in " ".join(text.split())
+    assert [p.name for p in path.parent.iterdir() if p.name.startswith("operator")] == []
+    remember(5)  # a guard that was killed before it had learned a primitive
+    with pytest.raises(ModelFileError, match=r"nothing is kept of operator 'operator' yet.*npz;"):
+        show_model(SITE, None, Console())
+    shown(lambda c: reset_model(SITE, None, c, sure=False))
+    assert not kept.exists()
+
+
+def test_spoilt_situations_are_told() -> None:
+    teach()
+    remember(5).write_bytes(b"rubbish")
+    with pytest.raises(ModelFileError, match="would set this file aside and remember nothing"):
+        show_model(SITE, None, Console())
 
 
 def test_reset_of_nothing_makes_nothing(tmp_path: Path) -> None:

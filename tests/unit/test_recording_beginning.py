@@ -21,11 +21,12 @@ from rampe_guard.recording.bundle import gather
 from rampe_guard.recording.recorded_site import learned_before, other_files
 from rampe_guard.recording.recorder import Ended
 from rampe_guard.recording.taps import Clock
-from rampe_guard.recording.writer import METADATA, MODEL, Head
+from rampe_guard.recording.writer import METADATA, MODEL, SITUATIONS, Head
 from rampe_guard.runtime.say import Sayer
-from rampe_guard.runtime.store import model_path
-from rampe_guard.runtime.store_format import encode, header_of
+from rampe_guard.runtime.store import model_path, situations_file
+from rampe_guard.runtime.store_format import encode, header_of, situations_header
 from rampe_guard.runtime.store_keeper import counted
+from rampe_guard.runtime.store_situations import encode_situations
 from rampe_guard.settings import Site
 from tests.support.messages import HEARTBEAT
 from tests.support.recording_files import entry, small_site, write
@@ -143,3 +144,27 @@ def test_what_was_learned_goes_along_and_is_where_a_replay_begins(
     _recall(machine, McapLog(site, McapReading(file), machine.arm.limits), fresh)
     assert fresh.rampe.categories == {}
     assert "what was learned before the recording is not used" in capsys.readouterr().err
+
+
+def test_situations_go_along_and_are_where_a_replay_begins(
+    site: Site, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    machine = load_machine(site)
+    before = machine.guard(0.0, "x").situations
+    for k in range(40):
+        before.see(0.1 * k, np.array([0.1 * k]), np.full(3, 0.1 * k))
+    header = situations_header(site, machine.arm.limits)
+    content = encode_situations(header, before.pieces())
+    with situations_file(model_path(site)) as file:
+        file.write(content)
+    head = beginning(site).head(1)
+    assert head.attachments[f"{SITUATIONS}anna.situations.npz"] == content
+    for damage, count, said in ((0, 40, False), (40, 0, True)):
+        name = f"{SITUATIONS}anna.situations.npz"
+        kept = {**head.attachments, name: content[: len(content) - damage]}
+        moved = [[entry(site, 0.0, "joystick", b"")]]
+        log = write(site, tmp_path / f"{damage}.mcap", moved, Head(head.metadata, kept))
+        guard = machine.guard(0.0, "y")
+        _recall(machine, McapLog(site, McapReading(log), machine.arm.limits), guard)
+        assert guard.situations.count == count
+        assert ("was remembered before the recording is not" in capsys.readouterr().err) is said

@@ -281,3 +281,9 @@ def test_events_are_bounded() -> None:
         state = follow.add_event(state, Level.CLEAR, str(i))
     assert len(state.events) == 50
     assert state.events[0].text == "199"
+
+
+def test_what_memory_says_of_an_alert_is_taken_over() -> None:
+    known = {"source": "next", "similar_situations": 8, "similar_contacts": 6}
+    assert [a.times for a in alerts(known).alerts] == [(6, 8)]
+    assert [a.times for a in alerts({}).alerts] == [None]

@@ -244,3 +244,11 @@ def test_a_position_beyond_its_limit_is_drawn_at_the_edge() -> None:
     assert "»" in line_of(shown(render(replace(CALM, actuators=(boom,)))), "boom")
     swing = replace(ACTUATORS[0], position=3 * 3.1416, sign=0)  # endless: drawn within one turn
     assert "●" in line_of(shown(render(replace(CALM, actuators=(swing,)))), "swing")
+
+
+def test_an_alert_of_memory_says_in_how_many_similar_situations_it_came_to_contact() -> None:
+    known = replace(ALERTS[2], source="next", times=(6, 8))
+    assert "next: 6 of 8" in line_of(shown(render(replace(STATE, alerts=(known,)))), "→ wall")
+    seen = replace(known, attention=False, acked_by="anna")
+    text = line_of(shown(render(replace(STATE, alerts=(seen,)))), "→ wall")
+    assert "next: 6 of 8 · seen by a" in text
