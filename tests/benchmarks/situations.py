@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import resource
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -118,4 +117,4 @@ def _told(took_ms: FloatArray) -> str:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--minutes", type=float, default=10.0)
-    sys.exit(main(parser.parse_args().minutes))
+    main(parser.parse_args().minutes)

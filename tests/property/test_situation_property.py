@@ -165,7 +165,7 @@ def test_new_habits_take_the_place_of_old_ones() -> None:
 @given(seed=st.integers(0, 10_000), count=st.integers(1, 8))
 def test_scenarios_keep_all_weight_and_stay_near_their_ways(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
-    time_s = np.arange(21) * 0.1
+    time_s: FloatArray = np.arange(21, dtype=np.float64) * 0.1
     analogues = [
         Analogue(
             float(rng.uniform(0.1, 1.0)),
