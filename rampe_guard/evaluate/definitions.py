@@ -7,7 +7,10 @@ from typing import Final
 GUARD: Final = "guard"
 SPARING: Final = "guard_sparing"
 GUARDS: Final = {
-    GUARD: "the guard itself, with the threshold for its warning probability",
+    GUARD: (
+        "the guard itself: on the curve the threshold is its warning and its imminent probability"
+        " alike; the operating point is as the site has set both"
+    ),
     SPARING: (
         "the guard with imminent_probability 1: by the stopping path it alarms only what is"
         " touched whatever the operator does"
@@ -44,7 +47,7 @@ DEFINITIONS: Final = {
         "entry less the start of its alarm, or less the end of the crossing before it within the"
         " same alarm; medians and quantiles are of warned crossings"
     ),
-    "operating_point": "at the site's warning probability",
+    "operating_point": "as the site's own settings have it",
     "published": (
         "the same of the guard's own alerts at a level or above, from rise to clear, with all its"
         " delays and deadbands"

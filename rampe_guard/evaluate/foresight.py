@@ -88,7 +88,7 @@ def report(found: Findings, machine: Machine) -> form.Report:
     said = [g.trace for g in guards]
     sparing = [replace(g.trace, floor=g.certain) for g in guards]
     forecasts = {
-        GUARD: _forecast(GUARDS[GUARD], said, case),
+        GUARD: _forecast(GUARDS[GUARD], said, case, [g.turned for g in guards]),
         SPARING: _forecast(GUARDS[SPARING], sparing, case),
     }
     for name, text in DESCRIPTIONS.items():
@@ -165,7 +165,11 @@ def _units(found: Findings, machine: Machine, zones: tuple[str, ...]) -> FloatAr
     )
 
 
-def _forecast(text: str, said: Sequence[Trace], case: _Case) -> form.Forecast:
+def _forecast(
+    text: str, said: Sequence[Trace], case: _Case, turned: Sequence[Trace] | None = None
+) -> form.Forecast:
+    """How good a forecaster is; ``turned`` is what it says where its curve is of more than that."""
+    along = said if turned is None else turned
     binary = all(trace.binary for trace in said)
     how = case.how
     # of yes and no, any threshold between them says the same
@@ -179,7 +183,7 @@ def _forecast(text: str, said: Sequence[Trace], case: _Case) -> form.Forecast:
         if binary
         else tuple(
             _point(j, j.threshold)
-            for j in curve(case.truths, THRESHOLDS, lambda threshold: (said, threshold), how)
+            for j in curve(case.truths, THRESHOLDS, lambda threshold: (along, threshold), how)
         ),
         operating_point=_point(at, None if binary else case.threshold),
         by_log={

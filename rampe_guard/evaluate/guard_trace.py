@@ -6,7 +6,7 @@ alone, whatever the site's warning probability.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,12 +33,15 @@ class GuardRun:
         trace: what it said at each evaluation.
         certain: what of its floor holds whatever the site's settings (k, z): the arm will touch
             whatever the operator does, is inside, or nothing is known.
+        turned: what it would say as a function of one threshold: its warning and its imminent
+            probability turned together, so that only what is certain is an alarm at any.
         transitions: its published alerts: time [s], zone, level; in order.
         knowledge: what it knows in the end.
     """
 
     trace: Trace
     certain: Mask
+    turned: Trace
     transitions: tuple[tuple[float, str, Level], ...]
     knowledge: Knowledge
 
@@ -85,7 +88,22 @@ def guard_trace(
                 transitions.append((now_s, event.zone, event.level))
                 shown[event.zone] = event.level
     known = {**guard.rampe.snapshot(), **guard.situations.snapshot()}
-    return GuardRun(notes.trace(), notes.certain(), tuple(transitions), known)
+    return GuardRun(notes.trace(), notes.certain(), notes.turned(), tuple(transitions), known)
+
+
+@dataclass(frozen=True, slots=True)
+class _Floor:
+    """What the stopping path alone says of a zone.
+
+    Attributes:
+        on: it makes it imminent.
+        certain: it would with any settings.
+        probability: of contact, where it touches [-].
+    """
+
+    on: bool = False
+    certain: bool = False
+    probability: float = 0.0
 
 
 class _Notes:
@@ -99,8 +117,9 @@ class _Notes:
         self._floor: list[list[bool]] = []
         self._certain: list[list[bool]] = []
         self._within: list[list[tuple[float, ...]]] = []
+        self._stop: list[list[float]] = []
 
-    def take(self, now_s: float, risks: tuple[ZoneRisk, ...], floors: dict[str, bool]) -> None:
+    def take(self, now_s: float, risks: tuple[ZoneRisk, ...], floors: dict[str, _Floor]) -> None:
         """Take one evaluation: risks, and the floors with whether each is certain."""
         z = len(self._zones)
         score, within = [0.0] * z, [(0.0,) * len(HORIZONS_S)] * z
@@ -111,13 +130,22 @@ class _Notes:
         self._time_s.append(now_s)
         self._score.append(score)
         self._within.append(within)
-        self._floor.append([zone in floors for zone in self._zones])
-        self._certain.append([floors.get(zone, False) for zone in self._zones])
+        none = _Floor()
+        found = [floors.get(zone, none) for zone in self._zones]
+        self._floor.append([floor.on for floor in found])
+        self._certain.append([floor.certain for floor in found])
+        self._stop.append([floor.probability for floor in found])
 
     def certain(self) -> Mask:
         """Floors that are certain (k, z)."""
         shape = (len(self._time_s), len(self._zones))
         return np.array(self._certain, dtype=np.bool_).reshape(shape)
+
+    def turned(self) -> Trace:
+        """All that was said, by one threshold."""
+        said = self.trace()
+        stop = np.array(self._stop, dtype=np.float64).reshape(said.score.shape)
+        return replace(said, score=np.maximum(said.score, stop), floor=self.certain())
 
     def trace(self) -> Trace:
         """All that was said."""
@@ -138,8 +166,8 @@ def _floors(
     risks: tuple[ZoneRisk, ...],
     alerts: AlertConfig,
     shown: dict[str, Level],
-) -> dict[str, bool]:
-    """Zones whose stopping path alone makes them imminent, as `core.levels` has it.
+) -> dict[str, _Floor]:
+    """Zones that the stopping path touches, as `core.levels` judges them.
 
     Args:
         sweeps: of all forecasts.
@@ -147,8 +175,6 @@ def _floors(
         alerts: settings.
         shown: the level of each zone's alert before this evaluation.
 
-    Returns:
-        For each, whether it would be so with any settings.
     """
     risk_of = {risk.zone: risk for risk in risks}
     found = {}
@@ -162,8 +188,7 @@ def _floors(
         if shown.get(sweep.zone, Level.CLEAR) >= Level.IMMINENT:
             least = lowered(least, alerts.deadband_probability)
         certain = sweep.certificate is Certificate.UNKNOWN or sweep.inside or risk.floor
-        if certain or risk.instant >= least:
-            found[sweep.zone] = certain
+        found[sweep.zone] = _Floor(certain or risk.instant >= least, certain, risk.instant)
     return found
 
 
