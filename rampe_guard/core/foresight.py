@@ -26,6 +26,8 @@ LOOK_S: Final = 0.1
 """Time between two looks ahead [s]."""
 _SAME: Final = 1e-3
 """A situation that changed by less is the same."""
+_CREEP: Final = 0.05
+"""Slower than this share of the top speed is rest."""
 _REST: Final = 1e-3
 """A piece shorter than this share of the travel is no motion."""
 
@@ -99,13 +101,16 @@ class Foresight:
     def __init__(self, config: GuardConfig, limits: FloatArray) -> None:
         n = len(config.actuators)
         self._config = config.next
-        self._likeness = Likeness(np.array([a.max_velocity for a in config.actuators]))
+        self._top = np.array([a.max_velocity for a in config.actuators])
+        self._deadband = np.array([a.deadband for a in config.actuators])
+        self._likeness = Likeness(self._top)
         self._limits = limits
         self.memory = SituationMemory(
             self._likeness, n, config.next.horizon_s, config.next.situations
         )
         self._outlook = NOTHING
         self._situation: FloatArray | None = None
+        self._busy_s: float | None = None
         self._looked: FloatArray | None = None
 
     @property
@@ -117,6 +122,7 @@ class Foresight:
         """Something was missing."""
         self.memory.interrupt()
         self._outlook, self._situation, self._looked = NOTHING, None, None
+        self._busy_s = None
 
     def see(
         self,
@@ -128,7 +134,11 @@ class Foresight:
         learn: bool,
     ) -> None:
         """Take the present situation, n values each; ``learn`` is False while in doubt."""
-        self._situation = self._likeness.point(position, velocity, command)
+        busy = (np.abs(command) > self._deadband) | (np.abs(velocity) > _CREEP * self._top)
+        if self._busy_s is None or busy.any():
+            self._busy_s = stamp_s
+        rest_s = max(stamp_s - self._busy_s, 0.0)
+        self._situation = self._likeness.point(position, velocity, command, rest_s)
         if learn:
             self.memory.see(stamp_s, position, self._situation)
         else:

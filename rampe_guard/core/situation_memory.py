@@ -47,7 +47,7 @@ _CANDIDATES: Final = 32
 """Nodes looked at in each chunk: a pass has several."""
 _SPARE: Final = 2
 """Finds kept beyond those wanted: the future of some is not known."""
-VERSION: Final = 1
+VERSION: Final = 2
 """Of what a snapshot means."""
 
 
@@ -75,10 +75,10 @@ class _Chunk:
 
     __slots__ = ("clock", "count", "points", "position", "tree")
 
-    def __init__(self, n: int) -> None:
+    def __init__(self, n: int, size: int) -> None:
         self.clock = np.empty(CHUNK)
         self.position = np.empty((CHUNK, n))
-        self.points = np.empty((CHUNK, 3 * n))
+        self.points = np.empty((CHUNK, size))
         self.count = 0
         self.tree: cKDTree | None = None
 
@@ -120,7 +120,7 @@ class SituationMemory:
         self._n = actuators
         self._horizon_s = horizon_s
         self._most = max(2, capacity // CHUNK)
-        self._chunks: list[_Chunk] = [_Chunk(actuators)]
+        self._chunks: list[_Chunk] = [_Chunk(actuators, likeness.size)]
         self._clock = 0.0
         self._stamp_s: float | None = None
         self._last: tuple[float, FloatArray] | None = None
@@ -143,7 +143,7 @@ class SituationMemory:
             self._clock += _GAP_S
 
     def see(self, stamp_s: float, position: FloatArray, point: FloatArray) -> None:
-        """Take the present situation: position (n,) and point (3n,), at a stamp [s]."""
+        """Take the present situation: position (n,) and point (3n + 1,), at a stamp [s]."""
         if self._stamp_s is not None:
             self._clock += max(stamp_s - self._stamp_s, 0.0)
         self._stamp_s = stamp_s
@@ -190,7 +190,7 @@ class SituationMemory:
         }
 
     def pieces(self) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
-        """The same chunk by chunk: clock (k,) [s], position (k, n) and points (k, 3n).
+        """The same chunk by chunk: clock (k,) [s], position (k, n) and points (k, 3n + 1).
 
         What they hold is never written again, so another thread may take its time over them.
         """
@@ -211,15 +211,15 @@ class SituationMemory:
         position = entry(arrays, "next_position").astype(np.float64)
         points = entry(arrays, "next_point").astype(np.float64)
         k, n = len(clock) if clock.ndim == 1 else -1, self._n
-        if position.shape != (k, n) or points.shape != (k, 3 * n):
+        if position.shape != (k, n) or points.shape != (k, self._likeness.size):
             raise ValueError(
                 f"snapshot has next_position {position.shape} and next_point {points.shape},"
-                f" need ({k}, {n}) and ({k}, {3 * n})"
+                f" need ({k}, {n}) and ({k}, {self._likeness.size})"
             )
         finite = all(np.isfinite(values).all() for values in (clock, position, points))
         if not finite or (np.diff(clock) < 0.0).any():
             raise ValueError("snapshot's situations are not finite and in order of time")
-        self._chunks = [_Chunk(n)]
+        self._chunks = [_Chunk(n, self._likeness.size)]
         self._last = self._stamp_s = None
         for now, where, point in zip(clock.tolist(), position, points, strict=True):
             self._clock = now
@@ -228,7 +228,7 @@ class SituationMemory:
 
     def _add(self, position: FloatArray, point: FloatArray) -> None:
         if self._chunks[-1].count == CHUNK:
-            self._chunks.append(_Chunk(self._n))
+            self._chunks.append(_Chunk(self._n, self._likeness.size))
             if len(self._chunks) > self._most:
                 del self._chunks[0]
         self._chunks[-1].add(self._clock, position, point)

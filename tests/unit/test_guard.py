@@ -271,3 +271,10 @@ def test_an_on_change_lever_needs_no_repetition() -> None:
         rig.tick(None, speed=0.8)
     assert rig.guard.snapshot(rig.now).health.status is Status.OK
     assert rig.alerts()[0].level is Level.IMMINENT
+
+
+def test_a_machine_that_is_parked_is_not_warned_of_what_it_did_before() -> None:
+    rig = Rig()
+    rig.strokes(6, length=1.2)
+    rig.hold(0.0, 8.0)
+    assert rig.alerts()[-1].level is Level.CLEAR

@@ -44,7 +44,7 @@ def work(mind: SituationMemory, situations: int, begin_s: float = 0.0) -> Situat
     steps = rng.uniform(0.015, 0.03, (situations, N)) * rng.choice([-1.0, 1.0], (situations, N))
     places = np.cumsum(steps, axis=0)
     for k, place in enumerate(places):
-        mind.see(begin_s + 0.1 * (k + 1), place, np.tile(place, 3))
+        mind.see(begin_s + 0.1 * (k + 1), place, np.append(np.tile(place, 3), 0.0))
     return mind
 
 
