@@ -83,7 +83,7 @@ def test_it_is_there_after_a_restart(site: Site, caplog: pytest.LogCaptureFixtur
     again = Desk(site)
     assert same_bits(again.mind.snapshot(), first.mind.snapshot())
     assert f"operator 'anna': {CHUNK + 100} situations of 0.1 h of work known" in caplog.text
-    here = np.tile(first.mind.snapshot()["next_position"][50], 3)
+    here = np.append(np.tile(first.mind.snapshot()["next_position"][50], 3), 0.0)
     assert len(again.mind.similar(here, 1)) == 1
     saved = again.path.stat().st_mtime_ns
     again.keeper.save()  # nothing is new
@@ -112,7 +112,7 @@ def test_it_is_saved_once_a_minute_and_less_often_when_it_is_large(
     work(desk.mind, 10, 200.0)
     desk.keeper.keep(4.0 * SAVE_S)  # 2.7 kB at a byte a second
     assert desk.on_disk() == 20
-    desk.keeper.keep(2.0 * SAVE_S + 20 * 8 * (1 + N + 3 * N))
+    desk.keeper.keep(2.0 * SAVE_S + 20 * 8 * (2 + N + 3 * N))
     until(lambda: desk.on_disk() == 30, 10.0, "30 situations")
     desk.keeper.close(10.0)
 
