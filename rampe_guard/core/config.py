@@ -165,7 +165,7 @@ class AlertConfig:
         shelve_max_s: longest time for which an alert may be shelved [s].
     """
 
-    imminent_probability: float = 0.15
+    imminent_probability: float = 0.25
     warning_probability: float = 0.2
     caution_probability: float = 0.1
     debounce_steps: int = 2

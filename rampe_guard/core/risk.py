@@ -1,17 +1,17 @@
 """One probability of contact per zone and horizon, from all three forecasts.
 
-What the present motion and primitive say is the prior, worth two similar situations:
+What the present motion and primitive say is the prior, worth four similar situations:
 
     π(h) = max(P of intent if it meets the zone within h,
                1/2 if the stopping path does, 4/5 if it does whatever the operator does)
 
 What memory says is counted in: of similar situations with weights wᵢ, those that met the zone
 
-    P(h) = (2 π(h) + Σ wᵢ [met within h]) / (2 + Σ wᵢ)
+    P(h) = (4 π(h) + Σ wᵢ [met within h]) / (4 + Σ wᵢ)
 
 So in a new place the present motion speaks alone, and where the operator has been many times,
 what he did there. Of the stopping paths that touch, a third to a half end in contact, since
-operators brake by themselves. P is smoothed over a quarter of a second, so that alarms do not
+operators brake by themselves. P is smoothed over 0.4 s, so that alarms do not
 flicker with the choice of situations; what decides about the stopping path is not.
 """
 
@@ -26,10 +26,10 @@ from rampe_guard.core.foresight import Outlook
 
 HORIZONS_S: Final = (0.5, 1.0, 2.0)
 """Horizons for which a probability is told [s]."""
-_PRIOR_WEIGHT: Final = 2.0
+_PRIOR_WEIGHT: Final = 4.0
 _BRAKES: Final = 0.5
 _TOO_LATE: Final = 0.8
-_SMOOTH_S: Final = 0.25
+_SMOOTH_S: Final = 0.4
 _NOTHING: Final = 1e-9
 """A probability below this is none."""
 _NEVER: Final = tuple(0.0 for _ in HORIZONS_S)

@@ -8,8 +8,9 @@ GUARD: Final = "guard"
 SPARING: Final = "guard_sparing"
 GUARDS: Final = {
     GUARD: (
-        "the guard itself: on the curve the threshold is its warning and its imminent probability"
-        " alike; the operating point is as the site has set both"
+        "the guard itself: on the curve it alarms from the threshold of its one probability on,"
+        " and where contact can no longer be avoided (imminent_probability 1); the operating point"
+        " is as the site has set both"
     ),
     SPARING: (
         "the guard with imminent_probability 1: by the stopping path it alarms only what is"

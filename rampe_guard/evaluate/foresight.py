@@ -88,7 +88,7 @@ def report(found: Findings, machine: Machine) -> form.Report:
     said = [g.trace for g in guards]
     sparing = [replace(g.trace, floor=g.certain) for g in guards]
     forecasts = {
-        GUARD: _forecast(GUARDS[GUARD], said, case, [g.turned for g in guards]),
+        GUARD: _forecast(GUARDS[GUARD], said, case, sparing),
         SPARING: _forecast(GUARDS[SPARING], sparing, case),
     }
     for name, text in DESCRIPTIONS.items():
@@ -166,10 +166,10 @@ def _units(found: Findings, machine: Machine, zones: tuple[str, ...]) -> FloatAr
 
 
 def _forecast(
-    text: str, said: Sequence[Trace], case: _Case, turned: Sequence[Trace] | None = None
+    text: str, said: Sequence[Trace], case: _Case, along: Sequence[Trace] | None = None
 ) -> form.Forecast:
-    """How good a forecaster is; ``turned`` is what it says where its curve is of more than that."""
-    along = said if turned is None else turned
+    """How good a forecaster is; ``along`` is what it says along its curve, if that is another."""
+    along = said if along is None else along
     binary = all(trace.binary for trace in said)
     how = case.how
     # of yes and no, any threshold between them says the same

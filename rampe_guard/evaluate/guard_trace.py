@@ -6,7 +6,7 @@ alone, whatever the site's warning probability.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -33,15 +33,12 @@ class GuardRun:
         trace: what it said at each evaluation.
         certain: what of its floor holds whatever the site's settings (k, z): the arm will touch
             whatever the operator does, is inside, or nothing is known.
-        turned: what it would say as a function of one threshold: its warning and its imminent
-            probability turned together, so that only what is certain is an alarm at any.
         transitions: its published alerts: time [s], zone, level; in order.
         knowledge: what it knows in the end.
     """
 
     trace: Trace
     certain: Mask
-    turned: Trace
     transitions: tuple[tuple[float, str, Level], ...]
     knowledge: Knowledge
 
@@ -88,7 +85,7 @@ def guard_trace(
                 transitions.append((now_s, event.zone, event.level))
                 shown[event.zone] = event.level
     known = {**guard.rampe.snapshot(), **guard.situations.snapshot()}
-    return GuardRun(notes.trace(), notes.certain(), notes.turned(), tuple(transitions), known)
+    return GuardRun(notes.trace(), notes.certain(), tuple(transitions), known)
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,12 +95,10 @@ class _Floor:
     Attributes:
         on: it makes it imminent.
         certain: it would with any settings.
-        probability: of contact, where it touches [-].
     """
 
     on: bool = False
     certain: bool = False
-    probability: float = 0.0
 
 
 class _Notes:
@@ -117,7 +112,6 @@ class _Notes:
         self._floor: list[list[bool]] = []
         self._certain: list[list[bool]] = []
         self._within: list[list[tuple[float, ...]]] = []
-        self._stop: list[list[float]] = []
 
     def take(self, now_s: float, risks: tuple[ZoneRisk, ...], floors: dict[str, _Floor]) -> None:
         """Take one evaluation: risks, and the floors with whether each is certain."""
@@ -134,18 +128,11 @@ class _Notes:
         found = [floors.get(zone, none) for zone in self._zones]
         self._floor.append([floor.on for floor in found])
         self._certain.append([floor.certain for floor in found])
-        self._stop.append([floor.probability for floor in found])
 
     def certain(self) -> Mask:
         """Floors that are certain (k, z)."""
         shape = (len(self._time_s), len(self._zones))
         return np.array(self._certain, dtype=np.bool_).reshape(shape)
-
-    def turned(self) -> Trace:
-        """All that was said, by one threshold."""
-        said = self.trace()
-        stop = np.array(self._stop, dtype=np.float64).reshape(said.score.shape)
-        return replace(said, score=np.maximum(said.score, stop), floor=self.certain())
 
     def trace(self) -> Trace:
         """All that was said."""
@@ -188,7 +175,7 @@ def _floors(
         if shown.get(sweep.zone, Level.CLEAR) >= Level.IMMINENT:
             least = lowered(least, alerts.deadband_probability)
         certain = sweep.certificate is Certificate.UNKNOWN or sweep.inside or risk.floor
-        found[sweep.zone] = _Floor(certain or risk.instant >= least, certain, risk.instant)
+        found[sweep.zone] = _Floor(certain or risk.instant >= least, certain)
     return found
 
 

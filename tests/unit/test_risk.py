@@ -39,10 +39,10 @@ def test_without_memory_the_present_motion_speaks_alone() -> None:
 
 def test_memory_counts_against_it_and_for_it() -> None:
     braking = Threat(stop_s=0.4)
-    assert weigh(braking, outlook()).probability == pytest.approx(1.0 / 6.0)
-    assert weigh(braking, outlook((0.5, 4.0))).probability == pytest.approx(5.0 / 6.0)
+    assert weigh(braking, outlook()).probability == pytest.approx(2.0 / 8.0)
+    assert weigh(braking, outlook((0.5, 4.0))).probability == pytest.approx(6.0 / 8.0)
     ahead = weigh(Threat(), outlook((1.8, 3.0)))
-    assert list(ahead.within) == pytest.approx([0.0, 0.0, 0.5])
+    assert list(ahead.within) == pytest.approx([0.0, 0.0, 3.0 / 8.0])
     assert ahead.source == "next"
     assert ahead.time_s == pytest.approx(1.8)
 
@@ -51,7 +51,7 @@ def test_what_was_foreseen_comes_nearer() -> None:
     seen = outlook((1.2, 4.0))
     assert weigh(Threat(), seen).within[1] == 0.0
     later = weigh(Threat(), seen, stamp_s=10.3)
-    assert later.within[1] == pytest.approx(4.0 / 6.0)
+    assert later.within[1] == pytest.approx(4.0 / 8.0)
     assert later.time_s == pytest.approx(0.9)
 
 
@@ -68,7 +68,7 @@ def test_it_is_smoothed_and_what_decides_about_stopping_is_not() -> None:
     book.begin(10.1)
     risk = book.weigh("wall", Threat(stop_s=0.3), NOTHING, 0.7, 10.1)
     assert risk.instant == pytest.approx(0.5)
-    assert risk.probability == pytest.approx(0.5 * (1.0 - np.exp(-0.1 / 0.25)))
+    assert risk.probability == pytest.approx(0.5 * (1.0 - np.exp(-0.1 / 0.4)))
     book.forget()
     book.begin(10.2)
     assert book.weigh("wall", Threat(stop_s=0.3), NOTHING, 0.7, 10.2).probability == 0.5
