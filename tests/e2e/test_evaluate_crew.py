@@ -49,10 +49,13 @@ def cluster(folder: Path) -> Iterator[str]:
         log.close()
         yield _address(folder / "scheduler.log", started[0])
     finally:
-        for process in reversed(started):
+        for process in reversed(started):  # a worker without its scheduler would look for it
             process.terminate()
-        for process in started:
-            process.wait(20)
+            try:
+                process.wait(20)
+            except subprocess.TimeoutExpired:  # its manners are not what is tested here
+                process.kill()
+                process.wait()
 
 
 def _address(log: Path, scheduler: subprocess.Popen[bytes]) -> str:

@@ -57,9 +57,10 @@ def remember(situations: int) -> Path:
     site = load_site(BENCH)
     limits = bench_limits(site)
     file = situations_file(model_path(site))
-    memory = SituationMemory(Likeness(np.ones(4)), 4, 2.5, 10_000)
+    likeness = Likeness(np.ones(4))
+    memory = SituationMemory(likeness, 4, 2.5, 10_000)
     for k in range(situations):
-        memory.see(0.1 * k, np.full(4, 0.1 * k), np.full(12, 0.1 * k))
+        memory.see(0.1 * k, np.full(4, 0.1 * k), np.full(likeness.size, 0.1 * k))
     with file:
         file.write(encode_situations(situations_header(site, limits), memory.pieces()))
     return file.path

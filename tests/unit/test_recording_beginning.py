@@ -13,6 +13,7 @@ import pytest
 from rampe_guard import wire
 from rampe_guard.assembly import load_machine
 from rampe_guard.core.guard import Guard
+from rampe_guard.core.situation import Likeness
 from rampe_guard.programs.recording import GUARD, _Beginning, summary
 from rampe_guard.programs.replaying import _recall
 from rampe_guard.recording import McapLog, McapReading
@@ -151,8 +152,9 @@ def test_situations_go_along_and_are_where_a_replay_begins(
 ) -> None:
     machine = load_machine(site)
     before = machine.guard(0.0, "x").situations
+    likeness = Likeness(np.ones(1))
     for k in range(40):
-        before.see(0.1 * k, np.array([0.1 * k]), np.full(3, 0.1 * k))
+        before.see(0.1 * k, np.array([0.1 * k]), np.full(likeness.size, 0.1 * k))
     header = situations_header(site, machine.arm.limits)
     content = encode_situations(header, before.pieces())
     with situations_file(model_path(site)) as file:
