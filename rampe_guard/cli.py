@@ -15,6 +15,7 @@ from rampe_guard.options import (
     add_dashboard,
     add_demo,
     add_evaluate,
+    add_log_format,
     add_model_actions,
     add_notify,
     add_operator,
@@ -34,7 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         code: int = args.command(args)
     except RampeGuardError as error:
-        print(f"rampe-guard: {error}", file=sys.stderr)
+        print(_complaint(str(error), args), file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         return 130
@@ -42,10 +43,17 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:  # a full disk behind a redirection, say
-        print(f"rampe-guard: {error}", file=sys.stderr)
+        print(_complaint(str(error), args), file=sys.stderr)
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 2
     return code
+
+
+def _complaint(text: str, args: argparse.Namespace) -> str:
+    """The last line of a command that cannot go on; as all lines are, if it writes a log."""
+    from rampe_guard.runtime.log_lines import complaint
+
+    return complaint(text, vars(args).get("log_format", "text"))
 
 
 # Each command imports what it needs: `schema` should not wait for meshes and Zenoh.
@@ -66,7 +74,8 @@ def _run(args: argparse.Namespace) -> int:
     from rampe_guard.runtime.supervisor import Supervisor, end_with_parent
 
     if args.supervisor:
-        return Supervisor([sys.executable, *args.again, "--no-supervisor"]).run()
+        guard_command = [sys.executable, *args.again, "--no-supervisor"]
+        return Supervisor(guard_command, log_format=args.log_format).run()
     from rampe_guard.runtime.stopping import StopFlag
 
     stop = StopFlag.on_signals()  # before the imports, which take a while
@@ -77,7 +86,7 @@ def _run(args: argparse.Namespace) -> int:
         from rampe_guard.runtime.daemon import run
         from rampe_guard.runtime.say import configure
 
-        configure()
+        configure(args.log_format)
         return lambda: run(args.site, args.connect, stop, args.operator)
 
     guard = stop.unless_stopped(imported)
@@ -144,6 +153,7 @@ def _notify(args: argparse.Namespace) -> int:
         args.sound,
         args.timeout,
         args.per_minute,
+        args.log_format,
     )
     return notify(wishes, StopFlag.on_signals())
 
@@ -155,7 +165,7 @@ def _record(args: argparse.Namespace) -> int:
     from rampe_guard.programs.recording import Wishes, record
     from rampe_guard.runtime.say import configure
 
-    configure()
+    configure(args.log_format)
     until = (args.rotate_mb, args.rotate_minutes, vars(args)["for"])
     wishes = Wishes(args.site, args.out, args.connect, args.operator, *until)
     print(record(wishes, stop))
@@ -253,6 +263,7 @@ def _parser() -> argparse.ArgumentParser:
     run = commands.add_parser("run", help="the daemon")
     add_site(run, connect=True)
     add_operator(run)
+    add_log_format(run)
     run.add_argument(
         "--no-supervisor",
         dest="supervisor",

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from rampe_guard.runtime.log_lines import FORMATS
+
 
 def add_watch(watch: argparse.ArgumentParser) -> None:
     """Machines, and how they are shown."""
@@ -31,6 +33,7 @@ def add_notify(parser: argparse.ArgumentParser) -> None:
         help="machines by the prefix of their guards' keys, such as 'rampe/*/*/guard'",
     )
     add_connect(parser)
+    add_log_format(parser)
     parser.add_argument(
         "--at-least",
         choices=("caution", "warning", "imminent"),
@@ -132,6 +135,7 @@ def add_dashboard(parser: argparse.ArgumentParser) -> None:
 def add_record(parser: argparse.ArgumentParser) -> None:
     """Machine, file, and when the next file begins."""
     add_site(parser, connect=True)
+    add_log_format(parser)
     parser.add_argument("out", help="file to begin with, such as OUT.mcap; OUT-0002.mcap follows")
     add_operator(parser)
     size, age = "size at which the next file begins", "age at which it does"
@@ -176,6 +180,16 @@ def add_alert_requests(ack: argparse.ArgumentParser, shelve: argparse.ArgumentPa
         parser.add_argument("--who", required=True, help=who)
     text = "for how long; 0 ends its silence"
     shelve.add_argument("--for", type=seconds, required=True, metavar="SECONDS", help=text)
+
+
+def add_log_format(parser: argparse.ArgumentParser) -> None:
+    """For people, or for programs."""
+    parser.add_argument(
+        "--log-format",
+        choices=FORMATS,
+        default="text",
+        help="of the log on stderr: text, or one JSON object a line (default text)",
+    )
 
 
 def add_operator(parser: argparse.ArgumentParser) -> None:

@@ -27,7 +27,8 @@ from rampe_guard.notify.sound import Sound, sounding
 from rampe_guard.notify.target import Target
 from rampe_guard.notify.tones import UNPROTECTED
 from rampe_guard.runtime.connecting import connect_to
-from rampe_guard.runtime.say import Sayer, configure
+from rampe_guard.runtime.log_lines import LogFormat, configure
+from rampe_guard.runtime.say import Sayer
 from rampe_guard.runtime.stopping import StopFlag
 from rampe_guard.runtime.zenoh_io import Bus, is_pattern
 from rampe_guard.settings import DEFAULT_ENDPOINT, ZenohSettings, load_site
@@ -51,6 +52,7 @@ class Wishes:
         sound: a player, "bell", or None.
         timeout_s: of each try [s].
         per_minute: notices that each target may get, in the long run [1/min].
+        log_format: of what is said on stderr.
     """
 
     site: str | None
@@ -62,6 +64,7 @@ class Wishes:
     sound: str | None
     timeout_s: float
     per_minute: float
+    log_format: LogFormat = "text"
 
 
 def notify(wishes: Wishes, stop: StopFlag) -> int:
@@ -75,7 +78,7 @@ def notify(wishes: Wishes, stop: StopFlag) -> int:
     targets += [Post(url, wishes.timeout_s) for url in wishes.posts]
     if not targets and wishes.sound is None:
         raise SettingsError("nowhere to tell: give --command, --post or --sound")
-    configure()
+    configure(wishes.log_format)
     say = Sayer("rampe_guard.notify")
     sound = None if wishes.sound is None else Sound(wishes.sound, say.warn, sys.stderr)
     desk = Desk([Messenger(t, wishes.per_minute, say.warn) for t in targets], sound, wishes, say)

@@ -56,4 +56,5 @@ class Intake:
         return batch.inputs(alive)
 
     def _warn(self, kind: str, message: Message, error: MessageError) -> None:
-        self._say.warn(kind, f"{message.key}: refused: {error}")
+        text = f"{message.key}: refused: {error}"
+        self._say.warn(kind, text, key=message.key, reason=error.reason)

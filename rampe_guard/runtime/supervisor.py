@@ -23,6 +23,8 @@ import time
 from collections.abc import Sequence
 from types import FrameType
 
+from rampe_guard.runtime.log_lines import LogFormat, complaint
+
 UNTRUSTED = 3
 """Exit code of a guard whose canary failed."""
 FINAL = (0, 2, 130)
@@ -48,6 +50,7 @@ class Supervisor:
         command: program and arguments.
         first_delay_s: wait before a guard is started anew [s].
         longest_delay_s: to which that is doubled after short lives [s].
+        log_format: of what it says on stderr.
     """
 
     def __init__(
@@ -55,7 +58,9 @@ class Supervisor:
         command: Sequence[str],
         first_delay_s: float = FIRST_DELAY_S,
         longest_delay_s: float = LONGEST_DELAY_S,
+        log_format: LogFormat = "text",
     ) -> None:
+        self._log_format: LogFormat = log_format
         self._command = list(command)
         self._first_delay_s, self._longest_delay_s = first_delay_s, longest_delay_s
         self._child: subprocess.Popen[bytes] | None = None
@@ -78,7 +83,7 @@ class Supervisor:
             cause, died = _words(code)
             if time.monotonic() - began_s >= SHORT_LIFE_S:
                 delay_s = self._first_delay_s
-            _say(f"the guard {died}; it is started anew in {delay_s:g} s")
+            _say(f"the guard {died}; it is started anew in {delay_s:g} s", self._log_format)
             self._wait(delay_s)
             delay_s = min(2.0 * delay_s, self._longest_delay_s)
         return 0
@@ -134,9 +139,9 @@ def _words(code: int) -> tuple[str, str]:
     return f"a crash ({name})", f"died of {name}"
 
 
-def _say(text: str) -> None:
+def _say(text: str, log_format: LogFormat) -> None:
     with contextlib.suppress(OSError):  # nobody reads it any more: no reason to stop guarding
-        print(f"rampe-guard: {text}", file=sys.stderr, flush=True)  # noqa: T201
+        print(complaint(text, log_format), file=sys.stderr, flush=True)  # noqa: T201
 
 
 def restarted_after() -> str | None:

@@ -139,7 +139,14 @@ class Worker:
         payload = wire.encode(message)
         self._alerts.put(payload)
         if event.kind == "transition":
-            self._say.info(f"{message.level}: {message.text}")
+            self._say.info(
+                f"{message.level}: {message.text}",
+                alert_id=message.alert_id,
+                level=message.level,
+                zone=message.zone,
+                link=message.link,
+                time_to_collision_s=message.time_to_collision_s,
+            )
         return payload
 
     def _beat(self, now_s: float) -> None:
@@ -165,7 +172,9 @@ class Worker:
         if self._heartbeat.status != self._status:
             self._status = self._heartbeat.status
             why = "; ".join(r.text for r in self._heartbeat.reasons)
-            self._say.info(f"status {self._status}{': ' + why if why else ''}")
+            codes = ",".join(r.code for r in self._heartbeat.reasons)
+            text = f"status {self._status}{': ' + why if why else ''}"
+            self._say.info(text, status=self._status, reasons=codes)
 
     def _answer(self, now_s: float) -> None:
         for request in self._states.drain():
@@ -200,14 +209,17 @@ class Worker:
         events = self._guard.acknowledge(ack.alert_id, ack.who, now_s)
         if not events:
             raise RefusedError(f"no alert {ack.alert_id!r} waits for an acknowledgement")
-        self._say.info(f"{ack.alert_id} acknowledged by {ack.who}")
+        self._say.info(
+            f"{ack.alert_id} acknowledged by {ack.who}", alert_id=ack.alert_id, who=ack.who
+        )
         return events
 
     def _shelve(self, payload: bytes, now_s: float) -> tuple[AlertEvent, ...]:
         wish = wire.decode(payload, wire.Shelve, limit=wire.MAX_PAYLOAD_BYTES)
         events = self._guard.shelve(wish.alert_id, wish.who, wish.duration_s, now_s)
         how = f"shelved for {wish.duration_s:g} s" if wish.duration_s else "no longer shelved"
-        self._say.info(f"{wish.alert_id} {how} by {wish.who}")
+        text = f"{wish.alert_id} {how} by {wish.who}"
+        self._say.info(text, alert_id=wish.alert_id, who=wish.who, duration_s=wish.duration_s)
         return events
 
 
