@@ -24,6 +24,7 @@ from rampe_guard.core.drive import actuator_value, domain
 from rampe_guard.core.drive_proof import check_monotone
 from rampe_guard.core.kinematics import Chain, ForwardKinematics, JointMap
 from rampe_guard.errors import GeometryError
+from rampe_guard.folders import Folders
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -82,7 +83,8 @@ def load_arm(description: ArmDescription) -> Arm:
     limits = _limits(description, joints, path)
     proven = _proven(limits, joints, maps, path)
     walk = _Walk(robot, maps, description.base_pose, path)
-    meshes = tuple(_link_mesh(link, path) for link in walk.links)
+    folders = None if description.folders is None else Folders(description.folders)
+    meshes = tuple(_link_mesh(link, path, folders) for link in walk.links)
     if all(mesh is None for mesh in meshes):
         raise GeometryError(f"{path}: no link has collision or visual geometry")
     return Arm(
@@ -295,13 +297,13 @@ def _held(joint: Any) -> float:
     return float(np.clip(0.0, limit.lower, limit.upper))
 
 
-def _link_mesh(link: Any, path: Path) -> TriangleMesh | None:
+def _link_mesh(link: Any, path: Path, folders: Folders | None) -> TriangleMesh | None:
     parts = []
     for shape in link.collisions or link.visuals:
         origin = np.eye(4) if shape.origin is None else np.asarray(shape.origin, dtype=float)
         if not np.isfinite(origin).all():
             raise GeometryError(f"{path}: link '{link.name}': its origin is not finite")
-        parts.append(_shape_mesh(shape.geometry, link.name, path).moved(origin))
+        parts.append(_shape_mesh(shape.geometry, link.name, path, folders).moved(origin))
     if not parts:
         return None
     offsets = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
@@ -313,10 +315,10 @@ def _link_mesh(link: Any, path: Path) -> TriangleMesh | None:
     return replace(mesh, notes=(*mesh.notes, *open_words(mesh, name)))
 
 
-def _shape_mesh(geometry: Any, link: str, path: Path) -> TriangleMesh:
+def _shape_mesh(geometry: Any, link: str, path: Path, folders: Folders | None) -> TriangleMesh:
     where = f"{path}: link '{link}'"
     if geometry.mesh is not None:
-        file = _mesh_file(str(geometry.mesh.filename), path)
+        file = _mesh_file(str(geometry.mesh.filename), path, folders)
         scale = 1.0 if geometry.mesh.scale is None else np.asarray(geometry.mesh.scale, dtype=float)
         if not (np.isfinite(scale).all() and np.all(scale != 0.0)):
             raise GeometryError(f"{where}: mesh {file} has scale {scale}")
@@ -339,8 +341,25 @@ def _shape_mesh(geometry: Any, link: str, path: Path) -> TriangleMesh:
     return ball_mesh(sizes[0]) if len(sizes) == 1 else prism_mesh(sizes[0], sizes[1])
 
 
-def _mesh_file(name: str, urdf: Path) -> Path:
-    """Find a mesh: beside the URDF, or for package://NAME/REST in or above its folder."""
+def _mesh_file(name: str, urdf: Path, folders: Folders | None) -> Path:
+    """Find a mesh: beside the URDF, or for package://NAME/REST in or above its folder.
+
+    Raises:
+        GeometryError: it is not there, or lies outside of ``folders``.
+    """
+    try:
+        file = _named_file(name, urdf)
+        if folders is None or folders.hold(file):
+            file.is_file()  # raises where no file can have such a name
+            return file
+        wrong, remedy = folders.refusal(file)
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        reason = getattr(error, "strerror", None) or error
+        raise GeometryError(f"{urdf}: mesh {name!r} cannot be looked for ({reason})") from None
+    raise GeometryError(f"{urdf}: mesh {name!r} {wrong}; {remedy}")
+
+
+def _named_file(name: str, urdf: Path) -> Path:
     folder = urdf.resolve().parent
     if not name.startswith("package://"):
         return folder / name.removeprefix("file://")

@@ -30,9 +30,11 @@ class ArmDescription:
         base_pose: pose of its root link in the world (4, 4) [m].
         joints: one entry per actuator, in actuator order, then the linkages.
         limits: per actuator (lower, upper) [unit]; None = from the URDF through the drive.
+        folders: absolute paths of those in which its meshes must lie; None: anywhere.
     """
 
     urdf: str
     base_pose: FloatArray
     joints: tuple[JointDrive, ...]
     limits: tuple[tuple[float | None, float | None], ...]
+    folders: tuple[str, ...] | None = None

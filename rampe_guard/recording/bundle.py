@@ -116,7 +116,7 @@ def _places(site: Site) -> Iterator[tuple[Path, str | None]]:
     for item in site.scene.objects:
         if isinstance(item, Mesh):
             yield _absolute(item.file), item.file
-    for _, place, found in _urdf_meshes(site.arm.urdf):
+    for _, place, found in _urdf_meshes(site):
         yield place, str(found)
 
 
@@ -132,20 +132,21 @@ def _written(site: Site) -> Iterator[tuple[str, Path]]:
     for item in site.scene.objects:
         if isinstance(item, Mesh):
             yield files[item.name], _absolute(item.file)
-    for reference, place, _ in _urdf_meshes(site.arm.urdf):
+    for reference, place, _ in _urdf_meshes(site):
         yield reference, place
 
 
-def _urdf_meshes(urdf: str) -> list[tuple[str, Path, Path]]:
+def _urdf_meshes(site: Site) -> list[tuple[str, Path, Path]]:
     """Per mesh: how the URDF names it, where that is seen from the URDF, and the file."""
     found = []
+    urdf = site.arm.urdf
     folder, here = _absolute(urdf).parent, Path(urdf).resolve().parent
     for link in read_urdf(Path(urdf)).links:
         for shape in link.collisions or link.visuals:
             if shape.geometry.mesh is None:
                 continue
             reference = shape.geometry.mesh.filename
-            file = mesh_file(reference, Path(urdf))
+            file = mesh_file(reference, Path(urdf), site.folders)
             place = file
             if not Path(reference.removeprefix("file://")).is_absolute():
                 place = folder / os.path.relpath(file, here)  # the URDF itself may be a link

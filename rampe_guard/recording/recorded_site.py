@@ -43,7 +43,7 @@ def recorded_site(reading: McapReading) -> Iterator[Site]:
             path = unpack(bundle, Path(folder))
         except LogError as error:
             raise LogError(f"{reading.path}: {error}") from None
-        yield for_operator(load_site(path), words.get("operator"))
+        yield for_operator(load_site(path, within=folder), words.get("operator"))
 
 
 def learned_before(reading: McapReading) -> bytes | None:

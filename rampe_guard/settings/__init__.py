@@ -15,6 +15,7 @@ from rampe_guard.settings.site import (
     Site,
     ZenohSettings,
     for_operator,
+    load_scene_text,
     load_site,
 )
 from rampe_guard.settings.site_model import DEFAULT_ENDPOINT
@@ -29,6 +30,7 @@ __all__ = [
     "ZenohSettings",
     "for_operator",
     "load_scene",
+    "load_scene_text",
     "load_site",
     "parse_scene",
     "scene_schema",

@@ -62,17 +62,6 @@ def _keys(model: SiteModel, problems: Problems) -> None:
             problems.add(path, what, "give another key")
 
 
-def used_keys(model: SiteModel) -> dict[str, str]:
-    """Every key that means something at a site, and what."""
-    used = {f"{model.keys.base}/{word}": "a key of the guard itself" for word in PUBLISHED}
-    for name in ("joystick", "actuators", "base", "enabled"):
-        if (key := getattr(model.keys, name)) is not None:
-            used[key] = f"keys.{name}"
-    if model.inputs.joystick.alive_key is not None:
-        used[model.inputs.joystick.alive_key] = "inputs.joystick.alive_key"
-    return used
-
-
 def wrong_key(key: str) -> str | None:
     """Why ``key`` is no exact Zenoh key, None if it is one."""
     wild = [letter for letter in _WILD if letter in key]

@@ -27,6 +27,7 @@ from rampe_guard.core.scene import (
     Sphere,
 )
 from rampe_guard.core.types import FloatArray, Point
+from rampe_guard.folders import Folders
 from rampe_guard.settings import scene_model as models
 from rampe_guard.settings.explain import validate
 from rampe_guard.settings.model import Pose
@@ -39,7 +40,11 @@ _MESH_SUFFIXES = (".stl", ".obj", ".ply")
 
 
 def load_scene(
-    path: str | Path, *, actuators: Sequence[str] = (), taken: Mapping[str, str] | None = None
+    path: str | Path,
+    *,
+    actuators: Sequence[str] = (),
+    taken: Mapping[str, str] | None = None,
+    folders: Folders | None = None,
 ) -> Scene:
     """Read a scene file.
 
@@ -47,13 +52,14 @@ def load_scene(
         path: the YAML file; meshes are relative to it.
         actuators: names of the site's actuators, in order, for actuator limits.
         taken: keys that no object may have, and what each of them is.
+        folders: where its meshes may lie; if left out, below its own.
 
     Raises:
         SettingsError: with file, line, key, value and remedy of every problem.
     """
     content = read_bytes(path, "scene file")
     document = parse(content, str(path))
-    context = _Context(tuple(actuators), dict(taken or {}), Path(path).parent)
+    context = _context(actuators, taken, Path(path).parent, folders)
     return _scene(document, context, str(Path(path).absolute()))
 
 
@@ -64,6 +70,7 @@ def parse_scene(
     taken: Mapping[str, str] | None = None,
     directory: str | Path = ".",
     name: str = "<scene>",
+    folders: Folders | None = None,
 ) -> Scene:
     """Read a scene from text, as it arrives in a query.
 
@@ -73,11 +80,12 @@ def parse_scene(
         taken: as in `load_scene`.
         directory: where the paths of meshes start.
         name: what messages call the text.
+        folders: where its meshes may lie; if left out, below ``directory``.
 
     Raises:
         SettingsError: as `load_scene`.
     """
-    context = _Context(tuple(actuators), dict(taken or {}), Path(directory))
+    context = _context(actuators, taken, Path(directory), folders)
     return _scene(parse(content, name), context, "")
 
 
@@ -88,6 +96,17 @@ class _Context:
     actuators: tuple[str, ...]
     taken: dict[str, str]
     directory: Path
+    folders: Folders
+
+
+def _context(
+    actuators: Sequence[str],
+    taken: Mapping[str, str] | None,
+    directory: Path,
+    folders: Folders | None,
+) -> _Context:
+    allowed = Folders.of(directory) if folders is None else folders
+    return _Context(tuple(actuators), dict(taken or {}), directory, allowed)
 
 
 def pose_matrix(pose: Pose) -> FloatArray:
@@ -100,11 +119,18 @@ def pose_matrix(pose: Pose) -> FloatArray:
 
 
 def existing_file(
-    problems: Problems, path: KeyPath, directory: Path, file: str, what: str
+    problems: Problems, path: KeyPath, directory: Path, file: str, what: str, folders: Folders
 ) -> str | None:
-    """Normal path of ``file`` seen from ``directory``, or None and a problem."""
+    """Normal path of ``file`` seen from ``directory``, or None and a problem.
+
+    Outside of ``folders`` it is not even looked for.
+    """
     full = os.path.normpath(directory / file)
     try:
+        if not folders.hold(full):
+            wrong, remedy = folders.refusal(full)
+            problems.add(path, f"{show(file)} {wrong}", remedy)
+            return None
         if Path(full).is_file():
             return full
         reason = "is a directory" if Path(full).is_dir() else "does not exist"
@@ -141,9 +167,16 @@ def _scene(document: Document, context: _Context, path: str) -> Scene:
             objects.append(value)
     problems.raise_if_any()
     digest = hashlib.sha256(document.content)
-    for value in objects:
+    left = MAX_MESH_BYTES
+    for index, value in enumerate(objects):
         if isinstance(value, Mesh):
-            digest.update(read_bytes(value.file, "mesh file", limit=MAX_MESH_BYTES))
+            content = read_bytes(value.file, "mesh file", limit=MAX_MESH_BYTES)
+            left -= len(content)
+            if left < 0:  # a thousand objects may name the same file
+                what = f"with it the meshes are larger than {MAX_MESH_BYTES // 2**20} MB together"
+                problems.add(("objects", index, "file"), what, "simplify them, or give fewer")
+                problems.raise_if_any()
+            digest.update(content)
     return Scene(tuple(objects), path, digest.hexdigest())
 
 
@@ -154,6 +187,7 @@ class _Builder:
         self._problems = problems
         self._actuators = context.actuators
         self._directory = context.directory
+        self._folders = context.folders
         self._motions = Motions(problems, context.taken)
         self._margin_m = margin_m
 
@@ -202,7 +236,9 @@ class _Builder:
             what = f"{show(item.file)} is not a mesh by its ending"
             self._problems.add(key, what, f"give a file in {', '.join(_MESH_SUFFIXES)}")
             return None
-        file = existing_file(self._problems, key, self._directory, item.file, "mesh file")
+        file = existing_file(
+            self._problems, key, self._directory, item.file, "mesh file", self._folders
+        )
         if file is None:
             return None
         pose = pose_matrix(item.pose)

@@ -27,11 +27,12 @@ from rampe_guard.core.config import (
 from rampe_guard.core.drive import CylinderDrive, FourBarDrive
 from rampe_guard.core.scene import Scene, SelfCollision
 from rampe_guard.errors import SettingsError
-from rampe_guard.settings.check import check, used_keys
+from rampe_guard.folders import Folders
+from rampe_guard.settings.check import PUBLISHED, check
 from rampe_guard.settings.explain import validate
 from rampe_guard.settings.model import MAX_NAME, Name
 from rampe_guard.settings.problems import Problems, show
-from rampe_guard.settings.scene import existing_file, load_scene, pose_matrix
+from rampe_guard.settings.scene import existing_file, load_scene, parse_scene, pose_matrix
 from rampe_guard.settings.site_model import (
     DEFAULT_ENDPOINT,
     ActuatorModel,
@@ -41,7 +42,7 @@ from rampe_guard.settings.site_model import (
     SelfCollisionModel,
     SiteModel,
 )
-from rampe_guard.settings.source import parse, read_bytes
+from rampe_guard.settings.source import Document, parse, read_bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +69,16 @@ class Keys:
     base: str
     joystick_alive: str | None
     enabled: str | None = None
+
+    def used(self) -> dict[str, str]:
+        """Every key that means something at the site, and what."""
+        used = {f"{self.base}/{word}": "a key of the guard itself" for word in PUBLISHED}
+        for name in ("joystick", "actuators", "base", "enabled"):
+            if (key := getattr(self, name)) is not None:
+                used[key] = f"keys.{name}"
+        if self.joystick_alive is not None:
+            used[self.joystick_alive] = "inputs.joystick.alive_key"
+        return used
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +135,7 @@ class Site:
         operator: whose way of working is learned.
         memory: how it is kept.
         self_collision: whether the arm is swept against itself.
+        folders: where its files may lie; None for one that was not read from a file.
     """
 
     name: str
@@ -142,6 +154,7 @@ class Site:
     operator: str = "operator"
     memory: MemorySettings = MemorySettings()
     self_collision: SelfCollision = field(default_factory=SelfCollision)
+    folders: Folders | None = None
 
     @property
     def actuator_names(self) -> tuple[str, ...]:
@@ -149,11 +162,13 @@ class Site:
         return tuple(a.name for a in self.guard.actuators)
 
 
-def load_site(path: str | Path) -> Site:
+def load_site(path: str | Path, *, within: str | Path | None = None) -> Site:
     """Read a site file, and the scene file that it names.
 
     Args:
         path: the YAML file; every path in it is relative to it.
+        within: the one folder in which its files must lie, instead of its own and those that it
+            allows: for a site file that somebody else may have written, as in a recording.
 
     Raises:
         SettingsError: with file, line, key, value and remedy of every problem.
@@ -162,21 +177,24 @@ def load_site(path: str | Path) -> Site:
     document = parse(content, str(path))
     model = validate(SiteModel, document)
     directory = Path(path).parent
+    folders = Folders.of(within) if within else _folders(model, directory, document)
     problems = Problems(document)
     check(model, problems)
     arm = model.arm
-    urdf = existing_file(problems, ("arm", "urdf"), directory, arm.urdf, "URDF file")
+    urdf = existing_file(problems, ("arm", "urdf"), directory, arm.urdf, "URDF file", folders)
     zenoh_config = None
     if model.zenoh.config is not None:
         where = ("zenoh", "config")
         file = model.zenoh.config
-        zenoh_config = existing_file(problems, where, directory, file, "Zenoh configuration file")
+        what = "Zenoh configuration file"
+        zenoh_config = existing_file(problems, where, directory, file, what, folders)
     names = tuple(a.name for a in arm.actuators)
+    keys = Keys(**model.keys.model_dump(), joystick_alive=model.inputs.joystick.alive_key)
     scene = Scene(())
-    scene_file = existing_file(problems, ("scene",), directory, model.scene, "scene file")
+    scene_file = existing_file(problems, ("scene",), directory, model.scene, "scene file", folders)
     if scene_file is not None:
         try:
-            scene = load_scene(scene_file, actuators=names, taken=used_keys(model))
+            scene = load_scene(scene_file, actuators=names, taken=keys.used(), folders=folders)
         except SettingsError as error:
             problems.extend(error)
     memory = _memory(model.memory, directory, problems)
@@ -186,9 +204,9 @@ def load_site(path: str | Path) -> Site:
         name=model.site,
         machine=model.machine,
         zenoh=_zenoh(model, zenoh_config),
-        keys=Keys(**model.keys.model_dump(), joystick_alive=model.inputs.joystick.alive_key),
+        keys=keys,
         format=model.format,
-        arm=_arm(model, urdf or ""),
+        arm=_arm(model, urdf or "", folders),
         guard=_guard(model),
         sweep=SweepConfig(**model.sweep.model_dump()),
         scene=scene,
@@ -199,6 +217,32 @@ def load_site(path: str | Path) -> Site:
         operator=model.operator,
         memory=memory,
         self_collision=_self_collision(model.self_collision),
+        folders=folders,
+    )
+
+
+def load_scene_text(text: bytes | str, site: Site, name: str = "<scene>") -> Scene:
+    """Read a scene that arrived as text, in the place of the site's own.
+
+    The rules of a scene file hold: plain YAML of at most 1 MB, 1000 objects and 24 levels, without
+    aliases, anchors or tags; meshes are named relative to the scene file that the site names, and
+    lie in the folders that it allows. Meshes are not looked into here.
+
+    Args:
+        text: as in a scene file, UTF-8 when bytes.
+        site: as `load_site` returned it.
+        name: what messages call the text.
+
+    Raises:
+        SettingsError: with line, key, value and remedy of every problem.
+    """
+    return parse_scene(
+        text,
+        actuators=site.actuator_names,
+        taken=site.keys.used(),
+        directory=Path(site.scene.path or site.path).parent,
+        name=name,
+        folders=site.folders,
     )
 
 
@@ -218,6 +262,17 @@ def for_operator(site: Site, name: str | None) -> Site:
             " without spaces at an end"
         ) from None
     return replace(site, operator=name)
+
+
+def _folders(model: SiteModel, directory: Path, document: Document) -> Folders:
+    try:
+        return Folders.of(directory, model.files.allow)
+    except (OSError, ValueError, RuntimeError) as error:  # a loop of links
+        problems = Problems(document)
+        reason = getattr(error, "strerror", None) or error
+        problems.add(("files", "allow"), f"cannot be followed ({reason})", "give other folders")
+        problems.raise_if_any()
+        raise
 
 
 def _memory(model: MemoryModel, directory: Path, problems: Problems) -> MemorySettings:
@@ -243,13 +298,14 @@ def _zenoh(model: SiteModel, config: str | None) -> ZenohSettings:
     return ZenohSettings(config, model.zenoh.mode, connect)
 
 
-def _arm(model: SiteModel, urdf: str) -> ArmDescription:
+def _arm(model: SiteModel, urdf: str, folders: Folders) -> ArmDescription:
     arm = model.arm
     index = {a.name: i for i, a in enumerate(arm.actuators)}
     own = [JointDrive(a.joint, i, a.drive.to_core()) for i, a in enumerate(arm.actuators)]
     more = [JointDrive(k.joint, index[k.actuator], k.drive.to_core()) for k in arm.linkages]
     limits = tuple((a.limits.lower, a.limits.upper) for a in arm.actuators)
-    return ArmDescription(urdf, pose_matrix(arm.base_pose), (*own, *more), limits)
+    pose = pose_matrix(arm.base_pose)
+    return ArmDescription(urdf, pose, (*own, *more), limits, folders.paths)
 
 
 def _guard(model: SiteModel) -> GuardConfig:

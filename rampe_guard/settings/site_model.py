@@ -191,6 +191,16 @@ class MemoryModel(Model):
     )
 
 
+class FilesModel(Model):
+    """Which files may be read beside those in the folder of the site file."""
+
+    allow: Annotated[tuple[Text, ...], Field(max_length=32)] = Field(
+        default=(),
+        description="The folders, relative to this file, in which scene, URDF, meshes, Zenoh "
+        "configuration and certificates may lie too; without it all of them lie below this file's.",
+    )
+
+
 class SiteModel(Model):
     """A machine at a site: its arm, its keys, its scene and how it is guarded."""
 
@@ -208,6 +218,7 @@ class SiteModel(Model):
     )
     arm: ArmModel = Field(description="The arm.")
     scene: Text = Field(description="The scene file, relative to this file.")
+    files: FilesModel = Field(default=FilesModel(), description="The files that may be read.")
     self_collision: SelfCollisionModel = Field(
         default=SelfCollisionModel(), description="The sweep of the arm against itself."
     )

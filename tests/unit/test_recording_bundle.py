@@ -40,7 +40,7 @@ def layout(folder: Path, *, absolute: bool) -> Path:
     text = SITE.replace("slider.urdf", str(urdf) if absolute else "../two/urdf/two.urdf")
     text = text.replace("scene: scene.yaml", f"scene: {scene}" if absolute else "scene: scene.yaml")
     (folder / "sites/zenoh.json5").write_text('{"transport": {"auth": {"password": "hush"}}}')
-    text += "zenoh: {config: zenoh.json5}\n"
+    text += "zenoh: {config: zenoh.json5}\nfiles: {allow: [..]}\n"
     site = folder / "sites/site.yaml"
     site.write_text(text)
     return site
