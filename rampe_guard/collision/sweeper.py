@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -32,6 +32,34 @@ if TYPE_CHECKING:
     from rampe_guard.core.types import FloatArray, Placement, SweepResult, ZoneSweep
 
 
+@dataclass(frozen=True, slots=True)
+class Body:
+    """What an arm brings into every scene.
+
+    Attributes:
+        links: shape of each link, None for those without geometry.
+        motion: where they are, and how fast they can move.
+        zones: of the arm against itself.
+        always_touching: pairs of links that were found to touch always, and are left out.
+    """
+
+    links: list[BoundingTree | None]
+    motion: ArmMotion
+    zones: tuple[SelfZone, ...]
+    always_touching: tuple[tuple[str, str], ...]
+
+    @classmethod
+    def build(
+        cls, arm: Arm, cache: ShapeCache, allowed: SelfCollision, progress: Progress | None
+    ) -> Body:
+        """Build it, or fetch the shapes from where they are kept."""
+        links = _link_trees(arm, cache, progress)
+        points = [_points(tree) for tree in links]
+        motion = ArmMotion(arm.chain, arm.joints, points, arm.proven[:, 0], arm.proven[:, 1])
+        own = self_zones(arm, motion, allowed)
+        return cls(links, motion, tuple(own.zones), own.always)
+
+
 class FclSweeper:
     """Certified sweeps of one arm in one scene; implements `core.types.PathSweeper`.
 
@@ -53,6 +81,7 @@ class FclSweeper:
         self_collision: SelfCollision | None = None,
         *,
         progress: Progress | None = None,
+        body: Body | None = None,
     ) -> None:
         """Build all shapes, or fetch them from where they are kept, and sweep once.
 
@@ -62,6 +91,7 @@ class FclSweeper:
             config: tolerances and budget.
             self_collision: whether the arm is swept against itself; not, if left out.
             progress: told what is done, and which share of it.
+            body: of the same arm, which then need not be built.
 
         Raises:
             GeometryError: if an object of the scene cannot be used, or a link is named that the
@@ -70,9 +100,7 @@ class FclSweeper:
         self.arm, self.scene = arm, scene
         config = SweepConfig() if config is None else config
         cache = default_cache()
-        links = _link_trees(arm, cache, progress)
-        points = [_points(tree) for tree in links]
-        motion = ArmMotion(arm.chain, arm.joints, points, arm.proven[:, 0], arm.proven[:, 1])
+        body = body or Body.build(arm, cache, self_collision or SelfCollision(), progress)
         zones: list[Zone | SelfZone | ActuatorLimit] = []
         solid: list[tuple[SolidObject, BoundingTree]] = []
         notes = list(arm.notes)
@@ -84,18 +112,27 @@ class FclSweeper:
                 zones.append(built.zone)
                 solid.append((item, built.zone.tree))
                 notes += built.notes
-        own = self_zones(arm, motion, self_collision or SelfCollision())
-        zones += own.zones
+        zones += body.zones
         self.zones = tuple(zone.name for zone in zones)
-        self.always_touching = own.always
+        self.always_touching = body.always_touching
         self.notes = tuple(notes)
-        self._motion = motion
+        self._body, self._config = body, config
+        self._motion = body.motion
         self._behind_m = config.tolerance_m
         self._link_of = {name: link for link, name in enumerate(arm.link_names)}
         self._link_poses = LinkPoses(arm.chain, arm.joints)
-        self._confirmer = Confirmer(links, solid)
-        self._sweep = Sweep(SweepProblem(motion, arm.link_names, links, zones), config)
+        self._confirmer = Confirmer(body.links, solid)
+        problem = SweepProblem(body.motion, arm.link_names, body.links, zones)
+        self._sweep = Sweep(problem, config)
         self._warm_up()
+
+    def in_scene(self, scene: Scene) -> FclSweeper:
+        """The same arm in another scene; what two sweepers share, neither writes.
+
+        Raises:
+            GeometryError: an object of the scene cannot be used.
+        """
+        return FclSweeper(self.arm, scene, self._config, body=self._body)
 
     def sweep(
         self,

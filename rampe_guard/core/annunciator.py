@@ -7,7 +7,7 @@ what people ask for (shelving) goes by the guard's own clock, which never stands
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from rampe_guard.core.alarm import Alarm, Inhibit, Level, urgency
@@ -23,6 +23,8 @@ from rampe_guard.core.types import Certificate
 from rampe_guard.errors import RefusedError
 
 _CALM = Evidence(Level.CLEAR, "system", None, None, None)
+_GONE = Evidence(Level.CLEAR, "contact", None, None, None)
+"""Of a zone that is no more: nothing can be met, and nobody computes how near it is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +61,7 @@ class Annunciator:
         self._raised_s: dict[str, float] = {}
         self._changed_s: dict[str, float] = {}
         self._stale = self._off = False
+        self._gone: set[str] = set()
         self.seq = 0
 
     def shown(self, zone: str) -> Level:
@@ -72,7 +75,15 @@ class Annunciator:
         events = []
         for zone, found in evidence.items():
             events += self._one(zone, found, moment)
+        for zone in self._gone:
+            events += self._one(zone, _GONE, moment)
+        self._gone = {zone for zone in self._gone if self._alarms[zone].active}
         return events
+
+    def change_zones(self, zones: Collection[str]) -> None:
+        """Other zones from now on. An alert of one that is gone ends as any other does."""
+        known = {zone for zone in self._alarms if zone != SYSTEM_ZONE}
+        self._gone = {zone for zone in known - set(zones) if self._alarms[zone].active}
 
     def system(self, evidence: Evidence, moment: Moment) -> list[AlertEvent]:
         """Take the evidence about the guard itself (latched)."""

@@ -92,6 +92,12 @@ class Assessor:
         self.foresight.interrupt()
         self._book.forget()
 
+    def change_scene(self, sweeper: PathSweeper) -> None:
+        """Sweep by another geometry from now on: what was found of the old one is dropped."""
+        self._sweeper = sweeper
+        self.foresight.look_anew()
+        self._book.forget()
+
     def assess(self, state: State, intention: Intention, around: Surroundings) -> Assessed:
         """Evaluate the present state."""
         stopping = self._forecaster.stopping(state.q, state.velocity, intention.command)

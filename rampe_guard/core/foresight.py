@@ -124,6 +124,10 @@ class Foresight:
         self._outlook, self._situation, self._looked = NOTHING, None, None
         self._busy_s = None
 
+    def look_anew(self) -> None:
+        """What was looked at is no longer there: look again, whenever the last look was."""
+        self._outlook, self._looked = NOTHING, None
+
     def see(
         self,
         stamp_s: float,

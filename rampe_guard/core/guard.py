@@ -10,10 +10,12 @@ is switched off, nothing is swept and alerts of zones are suppressed.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rampe_guard.core.alarm import Level
 from rampe_guard.core.annunciator import Annunciator, Moment
@@ -107,6 +109,8 @@ class Guard:
         self._swept_s = start_s
         self._poses_came = False
         self._restarted: str | None = None
+        self._other_scene = False
+        self._blank = _copied(self._intention.rampe.snapshot()), self.situations.snapshot()
 
     @property
     def rampe(self) -> Rampe:
@@ -154,6 +158,28 @@ class Guard:
         else:
             events += self._annunciator.repeats(moment)
         return tuple(events)
+
+    def change_scene(
+        self, sweeper: PathSweeper, zones: Collection[str], moving: Sequence[SolidObject] = ()
+    ) -> None:
+        """Guard against another scene from the next step on, which evaluates it.
+
+        Args:
+            sweeper: geometry: the same arm among other objects.
+            zones: names of all its zones.
+            moving: the objects whose poses come from a key.
+        """
+        self._assessor.change_scene(sweeper)
+        self._annunciator.change_zones(zones)
+        self._moving.change(moving)
+        self._sweeps, self._risks, self._other_scene = (), (), True
+
+    def forget(self) -> None:
+        """Forget all that was learned of the operator, from earlier runs too."""
+        models, situations = self._blank
+        self._interrupt()
+        self._intention.rampe.restore(models)
+        self.situations.restore(situations)
 
     def acknowledge(self, alert_id: str, who: str, now_s: float) -> tuple[AlertEvent, ...]:
         """Someone has seen an alert; empty if no alert of that id waits for it."""
@@ -270,7 +296,7 @@ class Guard:
             restless=lambda zone: self._moving.restless(zone, now_s),
             shown=self._annunciator.shown,
         )
-        self._swept_s, self._poses_came = now_s, False
+        self._swept_s, self._poses_came, self._other_scene = now_s, False, False
         state = State(newest.position, self._velocity.velocity, newest.stamp_s)
         found = self._assessor.assess(state, self._intention, around)
         if found.unknown:
@@ -282,6 +308,8 @@ class Guard:
         return [*alerts, *(self._foretold(event) for event in news)]
 
     def _must_look(self, now_s: float) -> bool:
+        if self._other_scene:
+            return True
         # a hair less than the period, so that it survives the rounding of ticks
         since_s = now_s - self._swept_s + 1e-6
         return bool(self._moving) and since_s >= (_FRESH_S if self._poses_came else _LOOK_S)
@@ -301,6 +329,10 @@ class Guard:
             prediction=None if newest is None else self._intention.summary(newest.position),
             degraded=health.status is Status.DEGRADED,
         )
+
+
+def _copied(arrays: Mapping[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
+    return {name: array.copy() for name, array in arrays.items()}
 
 
 def _in_stamp_order(inputs: Inputs) -> list[JoystickSample | ActuatorSample]:

@@ -56,6 +56,11 @@ class MovingObject:
         self._recent: dict[str, float] = {}
         self._too_fast: tuple[float, str] | None = None
 
+    def follows(self, item: SolidObject) -> bool:
+        """Whether the poses of ``item`` are those that are followed here, by the same rules."""
+        rules = (item.name, item.key or "", item.max_speed, item.timeout_s)
+        return rules == (self.name, self.key, self._max_speed, self._timeout_s)
+
     def take(self, sample: ObjectSample, clock: SenderClock) -> Fault | None:
         """Take a pose, or tell why it was refused."""
         verdict = _fault(sample) or self._gate.check(sample)
@@ -158,11 +163,22 @@ class MovingObjects:
     """
 
     def __init__(self, items: Sequence[SolidObject], config: InputConfig) -> None:
+        self._config = config
         self._objects = {item.name: MovingObject(item, config) for item in items}
         self._clock = SenderClock()
 
     def __bool__(self) -> bool:
         return bool(self._objects)
+
+    def change(self, items: Sequence[SolidObject]) -> None:
+        """Other objects from now on; one that is followed as before stays where it was seen."""
+        old = self._objects
+        self._objects = {
+            item.name: old[item.name]
+            if item.name in old and old[item.name].follows(item)
+            else MovingObject(item, self._config)
+            for item in items
+        }
 
     def follow(self, sample: ActuatorSample, *, restarted: bool) -> None:
         """Take an accepted position of the machine: its stamp tells how the clocks differ."""
