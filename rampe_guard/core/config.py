@@ -197,6 +197,7 @@ class InputConfig:
         max_stamp_jump_s: largest step of a stamp beyond the time that really passed [s].
         enabled_timeout_s: how long the machine's word that it is switched off holds [s]; None
             if it has no key to say so.
+        max_rate_hz: messages of each input that are looked at in the long run [1/s].
     """
 
     joystick_timeout_s: float = 0.5
@@ -206,6 +207,7 @@ class InputConfig:
     speed_slack: float = 5.0
     max_stamp_jump_s: float = 1.0
     enabled_timeout_s: float | None = None
+    max_rate_hz: float = 1000.0
 
 
 @dataclass(frozen=True, slots=True)

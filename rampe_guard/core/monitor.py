@@ -13,6 +13,7 @@ from collections import Counter, deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Final
 
 from rampe_guard.core.config import InputConfig
 from rampe_guard.core.screening import FAULTS
@@ -23,6 +24,9 @@ RECENT_S = 5.0
 _PLAUSIBLE_WINDOW_S = 10.0
 _IMPLAUSIBLE_SHARE = 0.1
 """More refused samples than this share is not a glitch: wrong columns, scale or sensor."""
+OVERLOAD: Final = "overload"
+"""Refusal of a message that came faster than messages can be looked at."""
+_FLOW_S = 1.0
 _FAULTY_RUN = 3
 """Refused primitives in a row that are no chance."""
 _ENOUGH_SAMPLES = 20
@@ -91,6 +95,28 @@ class Health:
     objects: tuple[ObjectHealth, ...] = ()
 
 
+class _Flow:
+    """How many messages a second were lost, over the last second or so."""
+
+    def __init__(self) -> None:
+        self._since_s: float | None = None
+        self._count = 0
+        self._rate_hz: float | None = None
+
+    def lost(self, now_s: float) -> None:
+        if self._since_s is None or now_s - self._since_s > RECENT_S:
+            self._since_s, self._count, self._rate_hz = now_s, 0, None
+        self._count += 1
+        if (passed_s := now_s - self._since_s) >= _FLOW_S:
+            self._rate_hz = self._count / passed_s
+            self._since_s, self._count = now_s, 0
+
+    def words(self) -> str:
+        if self._rate_hz is None:  # less than a second of it
+            return f"{self._count} messages"
+        return f"{self._rate_hz:.0f} messages/s"
+
+
 class InputMonitor:
     """Keeps the books of both inputs; time is passed in.
 
@@ -112,6 +138,7 @@ class InputMonitor:
         self._bad = 0
         self._unknown_s: float | None = None
         self._joystick_alive: bool | None = None
+        self._flows: dict[InputName, _Flow] = {}
         self._faulty: list[str] = []
         self._distrust: str | None = None
 
@@ -135,6 +162,9 @@ class InputMonitor:
         """A message was refused."""
         self._rejected[name, reason] += 1
         self._recent[name, reason] = now_s
+        if reason == OVERLOAD:  # which says nothing of whether its columns are right
+            self._flows.setdefault(name, _Flow()).lost(now_s)
+            return
         if name != "enabled":
             self._note(now_s, good=False)
 
@@ -263,6 +293,9 @@ class InputMonitor:
             found.append(Reason("joystick_unknown", "joystick", text))
         for (name, reason), at in sorted(self._recent.items()):
             if now_s - at <= RECENT_S:
+                if reason == OVERLOAD:
+                    found.append(self._overload(name))
+                    continue
                 count = self._rejected[name, reason]
                 text = f"{count} {name} messages refused: {reason}"
                 found.append(Reason(f"{name}_{reason}", name, text))
@@ -279,6 +312,13 @@ class InputMonitor:
             text = "a sweep ran out of its budget and was taken as contact"
             found.append(Reason("sweep_unknown", None, text))
         return found
+
+    def _overload(self, name: InputName) -> Reason:
+        text = (
+            f"{name}: {self._flows[name].words()} beyond {self._config.max_rate_hz:g}/s were not"
+            " looked at, only the newest were; nothing is learned meanwhile"
+        )
+        return Reason(OVERLOAD, name, text)
 
 
 def stamp_of(sample: JoystickSample | ActuatorSample) -> float | None:

@@ -10,6 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from rampe_guard import wire
+from rampe_guard.core.monitor import OVERLOAD
 from rampe_guard.core.rotation import rotation_of_quaternion, rotation_of_rpy
 from rampe_guard.core.types import (
     ActuatorSample,
@@ -96,6 +97,14 @@ class Batch:
             self._tell(f"object {name}:{error.reason}", message, error)
             return
         self._poses.append(object_sample(name, placed, self._now_s))
+
+    def lost(self, name: InputName, count: int) -> None:
+        """Take that ``count`` messages of an input were not looked at."""
+        self._rejected += [(name, OVERLOAD)] * count
+
+    def lost_poses(self, name: str, count: int) -> None:
+        """The same of poses of the object ``name``."""
+        self._lost += [(name, OVERLOAD)] * count
 
     def inputs(self, joystick_alive: bool | None) -> Inputs:
         """All of it, as `Guard.step` takes it."""

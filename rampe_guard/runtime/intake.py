@@ -1,13 +1,66 @@
-"""Zenoh messages to core inputs. A message that cannot be used becomes a counted refusal."""
+"""Zenoh messages to core inputs. A message that cannot be used becomes a counted refusal.
+
+So does one that came faster than it can be looked at: the newest are, within the budget of their
+input, and in what was learned meanwhile there is no trust.
+"""
 
 from __future__ import annotations
 
-from rampe_guard.core.types import Inputs
+import time
+from collections.abc import Callable
+
+from rampe_guard.core.types import InputName, Inputs
 from rampe_guard.errors import MessageError
 from rampe_guard.runtime.batch import Batch
+from rampe_guard.runtime.budget import Budget
 from rampe_guard.runtime.say import Sayer
 from rampe_guard.runtime.zenoh_io import Bus, Message
 from rampe_guard.settings import Site
+
+
+class Stream:
+    """One input: its ring of messages, and how many of them are looked at.
+
+    Args:
+        bus: to subscribe on.
+        key: of the input, without wildcards.
+        rate_hz: messages that are looked at in the long run [1/s].
+        now_s: now, on the clock of the steps.
+    """
+
+    def __init__(self, bus: Bus, key: str, rate_hz: float, now_s: float) -> None:
+        self.key = key
+        self._inbox = bus.inbox(key)
+        self._budget = Budget(rate_hz, now_s)
+        self._overruns = 0
+
+    @property
+    def overruns(self) -> int:
+        """How often the ring was full."""
+        return self._inbox.overruns
+
+    def take(self, now_s: float) -> tuple[list[Message], int]:
+        """What is looked at, oldest first, and how many messages are not (at least)."""
+        waiting = self._inbox.drain()
+        lost = self._inbox.overruns - self._overruns
+        self._overruns += lost
+        # what was put on a wildcard is refused unread, and takes nothing from the budget
+        good = sum(message.key == self.key for message in waiting)
+        beyond = good - self._budget.grant(good, now_s)
+        return _without_oldest(waiting, self.key, beyond), lost + beyond
+
+
+def _without_oldest(messages: list[Message], key: str, count: int) -> list[Message]:
+    """All but the oldest ``count`` of those on ``key``."""
+    if count == 0:
+        return messages
+    kept = []
+    for message in messages:
+        if count and message.key == key:
+            count -= 1
+        else:
+            kept.append(message)
+    return kept
 
 
 class Intake:
@@ -17,23 +70,27 @@ class Intake:
         keys = site.keys
         self._site = site
         self._say = say
-        self._joystick = bus.inbox(keys.joystick)
-        self._actuators = bus.inbox(keys.actuators)
-        self._enabled = None if keys.enabled is None else bus.inbox(keys.enabled)
+        self._rate_hz = rate_hz = site.guard.inputs.max_rate_hz
+        now_s = time.monotonic()
+
+        def stream(key: str) -> Stream:
+            return Stream(bus, key, rate_hz, now_s)
+
+        self._joystick = stream(keys.joystick)
+        self._actuators = stream(keys.actuators)
+        self._enabled = None if keys.enabled is None else stream(keys.enabled)
         self._objects = [
-            (item.name, item.key, bus.inbox(item.key))
-            for item in site.scene.moving
-            if item.key is not None
+            (item.name, stream(item.key)) for item in site.scene.moving if item.key is not None
         ]
         self._alive = None if keys.joystick_alive is None else bus.liveness(keys.joystick_alive)
 
     @property
     def overruns(self) -> int:
         """How often an input came faster than it was drained."""
-        inboxes = [self._joystick, self._actuators, *(inbox for _, _, inbox in self._objects)]
+        streams = [self._joystick, self._actuators, *(stream for _, stream in self._objects)]
         if self._enabled is not None:
-            inboxes.append(self._enabled)
-        return sum(inbox.overruns for inbox in inboxes)
+            streams.append(self._enabled)
+        return sum(stream.overruns for stream in streams)
 
     def collect(self, now_s: float) -> Inputs:
         """Everything that arrived.
@@ -42,19 +99,39 @@ class Intake:
         actuator message is then in the same step, as it is in replay.
         """
         batch = Batch(self._site, now_s, self._warn)
-        actuators = self._actuators.drain()
-        for message in self._joystick.drain():
-            batch.joystick(message)
-        for message in actuators:
-            batch.actuators(message)
+        actuators = self._actuators.take(now_s)
+        self._read(batch, "joystick", self._joystick.take(now_s), batch.joystick)
+        self._read(batch, "actuators", actuators, batch.actuators)
         alive = None if self._alive is None else self._alive.poll()
-        for name, key, inbox in self._objects:
-            for message in inbox.drain():
-                batch.pose(name, key, message)
-        for message in [] if self._enabled is None else self._enabled.drain():
-            batch.enabled(message)
+        for name, stream in self._objects:
+            messages, lost = stream.take(now_s)
+            for message in messages:
+                batch.pose(name, stream.key, message)
+            if lost:
+                batch.lost_poses(name, lost)
+                self._warn_lost(f"object {name}", lost)
+        if self._enabled is not None:
+            self._read(batch, "enabled", self._enabled.take(now_s), batch.enabled)
         return batch.inputs(alive)
+
+    def _read(
+        self,
+        batch: Batch,
+        name: InputName,
+        taken: tuple[list[Message], int],
+        decode: Callable[[Message], None],
+    ) -> None:
+        messages, lost = taken
+        if lost:
+            batch.lost(name, lost)
+            self._warn_lost(name, lost)
+        for message in messages:
+            decode(message)
 
     def _warn(self, kind: str, message: Message, error: MessageError) -> None:
         text = f"{message.key}: refused: {error}"
         self._say.warn(kind, text, key=message.key, reason=error.reason)
+
+    def _warn_lost(self, who: str, lost: int) -> None:
+        text = f"{who}: {lost} messages at once were not looked at: more than {self._rate_hz:g}/s"
+        self._say.warn(f"{who}:overload", text, reason="overload", lost=lost)

@@ -327,6 +327,7 @@ def _guard(model: SiteModel) -> GuardConfig:
             speed_slack=inputs.speed_slack,
             max_stamp_jump_s=inputs.max_stamp_jump_s,
             enabled_timeout_s=None if model.keys.enabled is None else inputs.enabled.timeout_s,
+            max_rate_hz=inputs.max_rate_hz,
         ),
         axes=max(a.axis for a in actuators) + 1,
     )

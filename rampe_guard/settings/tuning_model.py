@@ -290,3 +290,8 @@ class InputsModel(Model):
         default=_INPUTS.max_stamp_jump_s,
         description="The largest step of a stamp beyond the time that really passed [s].",
     )
+    max_rate_hz: Annotated[float, Field(ge=10.0, le=100_000.0)] = Field(
+        default=_INPUTS.max_rate_hz,
+        description="The messages of each input that are looked at [1/s]; of more, the newest "
+        "are, and the status is degraded.",
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections import defaultdict
 from pathlib import Path
 from typing import Any, cast
@@ -159,3 +160,70 @@ def test_lost_poses_are_counted(post: Post, intake: Intake) -> None:
     post.rings["r/van"].overruns = 2
     post.rings["r/joystick"].overruns = 1
     assert intake.overruns == 3
+
+
+def levers(count: int) -> list[dict[str, Any]]:
+    return [{"stamp": 1.0 + k * 1e-4, "axes": [k / count]} for k in range(count)]
+
+
+def test_of_a_flood_the_newest_are_looked_at_and_the_others_counted(
+    post: Post, intake: Intake
+) -> None:
+    for body in levers(1000):
+        post.put("r/joystick", body)
+    post.put("r/actuators", {"stamp": 1.0, "position": [0.1]})
+    now_s = time.monotonic()
+    inputs = intake.collect(now_s)
+    assert len(inputs.joystick) == 250  # a quarter of a second of inputs.max_rate_hz
+    assert inputs.joystick[-1].axes == [0.999]
+    assert inputs.joystick[0].axes == [0.75]
+    assert inputs.rejected == (("joystick", "overload"),) * 750
+    assert len(inputs.actuators) == 1  # which have a budget of their own
+
+
+def test_a_flood_that_lasts_gets_the_long_run_rate_and_always_the_newest(
+    post: Post, intake: Intake
+) -> None:
+    start_s = time.monotonic()
+    seen = lost = 0
+    for look in range(1000):  # a second of 10 kHz
+        for body in levers(10):
+            post.put(
+                "r/truck",
+                {"stamp": look + body["stamp"], "xyz_m": [look, 0, 0], "rpy_rad": [0, 0, 0]},
+            )
+        inputs = intake.collect(start_s + look * 1e-3)
+        seen += len(inputs.objects)
+        lost += len(inputs.objects_rejected)
+        assert inputs.objects[-1].pose[0, 3] == look
+    assert seen + lost == 10_000
+    assert 1000 <= seen <= 1300
+
+
+def test_a_full_ring_is_a_loss_too(post: Post, intake: Intake) -> None:
+    post.put("r/joystick", {"axes": [0.5]})
+    post.rings["r/joystick"].overruns = 1
+    inputs = intake.collect(1.0)
+    assert inputs.rejected == (("joystick", "overload"),)
+    assert len(inputs.joystick) == 1
+    assert intake.overruns == 1
+    assert intake.collect(1.1).rejected == ()
+
+
+def test_rubbish_on_a_wildcard_takes_nothing_from_the_budget(post: Post, intake: Intake) -> None:
+    post.put("r/joystick", {"axes": [0.5]})
+    for _ in range(1000):
+        post.put("r/joystick", {"axes": [0.1]}, on="r/*")
+    inputs = intake.collect(1.0)
+    assert [s.axes.tolist() for s in inputs.joystick] == [[0.5]]
+    assert set(inputs.rejected) == {("joystick", "wildcard_key")}
+
+
+def test_a_burst_after_a_network_that_stood_still_is_taken_whole(
+    post: Post, intake: Intake
+) -> None:
+    for body in levers(200):
+        post.put("r/joystick", body)
+    inputs = intake.collect(time.monotonic())
+    assert len(inputs.joystick) == 200
+    assert inputs.rejected == ()

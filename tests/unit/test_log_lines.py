@@ -11,7 +11,6 @@ from typing import Any
 
 import pytest
 
-from rampe_guard.runtime import say as say_module
 from rampe_guard.runtime.log_lines import LONGEST, Behind, JsonLines, TextLines, complaint, one_line
 from rampe_guard.runtime.say import Sayer
 from tests.support.processes import until
@@ -87,7 +86,7 @@ def test_each_kind_is_said_once_a_second_with_the_count_held_back(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     now_s = 100.0
-    monkeypatch.setattr(say_module.time, "monotonic", lambda: now_s)
+    monkeypatch.setattr("rampe_guard.runtime.say.time.monotonic", lambda: now_s)
     say, heard = sayer(JsonLines(), "test.rate")
     for _ in range(5):
         say.warn("a", "this")
@@ -103,7 +102,7 @@ def test_invented_kinds_neither_fill_the_memory_nor_the_log(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     now_s = 100.0
-    monkeypatch.setattr(say_module.time, "monotonic", lambda: now_s)
+    monkeypatch.setattr("rampe_guard.runtime.say.time.monotonic", lambda: now_s)
     say, heard = sayer(TextLines(), "test.kinds")
     for number in range(10_000):
         say.warn(f"kind {number}", "spam")

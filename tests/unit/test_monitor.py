@@ -178,3 +178,32 @@ def test_a_late_word_of_an_on_change_joystick_is_told_and_does_not_blind_for_eve
     for now_s, expected in ((101.0, ["joystick_late"]), (105.0, ["joystick_late"]), (107.0, [])):
         monitor.accept("actuators", now_s, now_s)
         assert codes(monitor, now_s) == expected
+
+
+def test_messages_that_came_too_fast_degrade_and_say_how_many() -> None:
+    monitor = fed()
+    for k in range(1000):  # half a second at 2 kHz
+        monitor.reject("joystick", "overload", 1.0 + k / 2000)
+    monitor.accept("joystick", 1.5)
+    monitor.accept("actuators", 1.5)
+    health = monitor.health(1.5)
+    assert health.status is Status.DEGRADED
+    (reason,) = health.reasons
+    assert (reason.code, reason.input) == ("overload", "joystick")
+    assert "1000 messages beyond 1000/s" in reason.text
+    for k in range(2000):
+        monitor.reject("joystick", "overload", 1.5 + k / 2000)
+    (reason,) = [r for r in monitor.health(2.5).reasons if r.code == "overload"]
+    assert "messages/s" in reason.text
+    assert float(reason.text.split()[1]) == pytest.approx(2000, rel=0.01)
+    assert monitor.health(2.5).rejected["joystick", "overload"] == 3000
+
+
+def test_what_was_lost_to_a_flood_says_nothing_of_the_columns() -> None:
+    monitor = fed()
+    for _ in range(1000):
+        monitor.reject("joystick", "overload", 1.0)
+    assert monitor.plausible(1.0)
+    monitor.accept("joystick", 8.0)
+    monitor.accept("actuators", 8.0)
+    assert monitor.health(8.0).status is Status.OK  # and it is over when it is over
