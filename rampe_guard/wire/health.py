@@ -82,6 +82,20 @@ class Remembered(Message, frozen=True, kw_only=True):
     work_s: Annotated[float, Meta(description="Time of work that they span [s].")]
 
 
+class Learned(Message, frozen=True, kw_only=True):
+    """What is learned of the operator's primitives."""
+
+    categories: Annotated[int, Meta(description="Categories of primitives met.")]
+    occurrences: Annotated[int, Meta(description="Primitives learned, earlier runs' too.")]
+
+
+class Resources(Message, frozen=True, kw_only=True):
+    """What the guard's process takes of its computer."""
+
+    rss_bytes: Annotated[int, Meta(description="Memory that it occupies [bytes].")]
+    cpu_s: Annotated[float, Meta(description="Processor time since it started [s].")]
+
+
 class Heartbeat(Message, frozen=True, kw_only=True):
     """Health of the guard, sent from its worker loop."""
 
@@ -125,8 +139,32 @@ class Heartbeat(Message, frozen=True, kw_only=True):
         Remembered | None, Meta(description="The memory of situations; null if it is unknown.")
     ] = None
     drops: Annotated[
-        int | None, Meta(description="Messages lost to full queues since the boot; null unknown.")
+        int | None,
+        Meta(
+            description="How often a queue of inputs was found full since the boot, and has lost "
+            "messages; null unknown. What was not looked at is refused as overload."
+        ),
     ]
+    alerts: Annotated[
+        dict[str, int] | None,
+        Meta(description="Alerts that are active or wait for a person, by level; null unknown."),
+    ] = None
+    learned: Annotated[
+        Learned | None, Meta(description="The learned primitives; null if it is unknown.")
+    ] = None
+    save_failures: Annotated[
+        int | None,
+        Meta(description="Saves of what is learned that failed since the boot; null unknown."),
+    ] = None
+    router: Annotated[
+        bool | None, Meta(description="Whether a Zenoh router was there; null unknown.")
+    ] = None
+    resources: Annotated[
+        Resources | None, Meta(description="Memory and processor time; null unknown.")
+    ] = None
+    steps: Annotated[
+        int | None, Meta(description="Steps from a new position since the boot; null unknown.")
+    ] = None
     loop_ms: Annotated[
         Quantiles | None, Meta(description="Times of the worker loop; null before the first.")
     ]
