@@ -237,6 +237,13 @@ def _schema(args: argparse.Namespace) -> int:
     return 0
 
 
+def _access(args: argparse.Namespace) -> int:
+    from rampe_guard.programs.access import write_router_config
+
+    print(write_router_config(args.file, args.out), end="")
+    return 0
+
+
 def _ack(args: argparse.Namespace) -> int:
     from rampe_guard.programs.watching import acknowledge
 
@@ -309,6 +316,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     schema.add_argument("--out", metavar="FOLDER", help="write the message contract there instead")
 
+    access = commands.add_parser("access", help="a router's file from the site's access list")
+    access.add_argument("file", help="access list (YAML), such as deploy/access.example.yaml")
+    access.add_argument("--out", metavar="FILE", help="write it there, not on standard output")
+
     ack = commands.add_parser("ack", help="acknowledge an alert")
     shelve = commands.add_parser("shelve", help="silence an alert for a short while")
     add_alert_requests(ack, shelve)
@@ -331,6 +342,7 @@ _COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "paper": _paper,
     "model": _model,
     "schema": _schema,
+    "access": _access,
     "ack": _ack,
     "shelve": _shelve,
 }
