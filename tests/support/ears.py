@@ -14,11 +14,13 @@ import zenoh
 from tests.support.processes import until
 
 
-def open_session(endpoint: str) -> zenoh.Session:
-    """A client of one router that finds nobody by itself and comes back by itself."""
+def open_session(endpoint: str | list[str]) -> zenoh.Session:
+    """A client of one router (the first that answers) that comes back by itself."""
     config = zenoh.Config()
     config.insert_json5("mode", '"client"')
-    config.insert_json5("connect/endpoints", json.dumps([endpoint]))
+    config.insert_json5(
+        "connect/endpoints", json.dumps([endpoint] if isinstance(endpoint, str) else endpoint)
+    )
     config.insert_json5("connect/timeout_ms", "5000")
     config.insert_json5("connect/retry", '{"period_init_ms": 100, "period_max_ms": 500}')
     config.insert_json5("listen/endpoints", "[]")
