@@ -6,6 +6,7 @@ nothing but the standard library. It
 
 * starts the guard anew after a death by a signal or an exit code that no command ends with on
   purpose, says of what it died, and tells the new one, which raises it as an alert;
+* kills it when its loop has not turned for ten seconds, which is a death like any other;
 * passes on signals, waits for the end, and ends with the same code;
 * takes the guard with it when it dies itself.
 """
@@ -24,6 +25,8 @@ from collections.abc import Sequence
 from types import FrameType
 
 from rampe_guard.runtime.log_lines import LogFormat, complaint
+from rampe_guard.runtime.systemd import Watchdog
+from rampe_guard.runtime.turning import PERIOD_S, Listener
 
 UNTRUSTED = 3
 """Exit code of a guard whose canary failed."""
@@ -34,6 +37,8 @@ SHORT_LIFE_S = 10.0
 """A guard that dies younger makes the next one wait twice as long."""
 GRACE_S = 10.0
 """A guard that was told to end and has not by then is killed."""
+LAST_WORDS_S = 1.0
+"""In which a guard that hangs can still say where, before it is killed."""
 
 RESTARTED = "RAMPE_GUARD_RESTARTED"
 """Environment: what the guard before this one died of."""
@@ -51,6 +56,7 @@ class Supervisor:
         first_delay_s: wait before a guard is started anew [s].
         longest_delay_s: to which that is doubled after short lives [s].
         log_format: of what it says on stderr.
+        look_s: ten looks of so long in a row without a turn of its loop are a hang [s].
     """
 
     def __init__(
@@ -59,12 +65,15 @@ class Supervisor:
         first_delay_s: float = FIRST_DELAY_S,
         longest_delay_s: float = LONGEST_DELAY_S,
         log_format: LogFormat = "text",
+        look_s: float = PERIOD_S,
     ) -> None:
         self._log_format: LogFormat = log_format
         self._command = list(command)
         self._first_delay_s, self._longest_delay_s = first_delay_s, longest_delay_s
+        self._look_s = look_s
         self._child: subprocess.Popen[bytes] | None = None
-        self._stopping = False
+        self._stopping = self._hung = False
+        self._manager = Watchdog()
 
     def run(self) -> int:
         """Until the guard ends on purpose or a signal ends both; returns the exit code."""
@@ -80,10 +89,12 @@ class Supervisor:
                 return code
             if self._stopping:
                 return 0 if -code in _PASSED_ON else 128 - code if code < 0 else code
-            cause, died = _words(code)
+            cause, died = ("a hang", "hung and was killed") if self._hung else _words(code)
             if time.monotonic() - began_s >= SHORT_LIFE_S:
                 delay_s = self._first_delay_s
-            _say(f"the guard {died}; it is started anew in {delay_s:g} s", self._log_format)
+            text = f"the guard {died}; it is started anew in {delay_s:g} s"
+            _say(text, self._log_format)
+            self._manager.status(text)
             self._wait(delay_s)
             delay_s = min(2.0 * delay_s, self._longest_delay_s)
         return 0
@@ -91,6 +102,7 @@ class Supervisor:
     def _live(self, cause: str | None) -> int:
         """Start a guard and wait for its end; its exit code, negative for a signal."""
         near, far = os.pipe()
+        listener = Listener(self._look_s)
         environment = {**os.environ, LIFELINE: f"{os.getpid()} {near}"}
         environment.pop(RESTARTED, None)
         if cause is not None:
@@ -98,16 +110,36 @@ class Supervisor:
         try:
             # a session of its own: what a terminal sends comes to this process alone, once
             child = subprocess.Popen(  # noqa: S603 - our own command line
-                self._command, env=environment, pass_fds=(near,), start_new_session=True
+                self._command,
+                env=listener.environment(environment),
+                pass_fds=(near, listener.far),
+                start_new_session=True,
             )
             self._child = child
+            listener.started()
             if self._stopping:  # a signal came before there was anyone to pass it on to
                 self._end(child)
+            self._hung = self._watch(child, listener)
             return child.wait()
         finally:
             self._child = None
+            listener.close()
             os.close(near)
             os.close(far)
+
+    def _watch(self, child: subprocess.Popen[bytes], listener: Listener) -> bool:
+        """Until the guard's end, or until it hangs and is killed for that; whether it did."""
+        while child.poll() is None:
+            hangs = listener.hangs()
+            if hangs is None:
+                return False
+            if hangs and not self._stopping:
+                child.send_signal(signal.SIGABRT)  # faulthandler says where it stands
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    child.wait(LAST_WORDS_S)
+                child.kill()
+                return True
+        return False
 
     def _pass_on(self, _signal: int, _frame: FrameType | None) -> None:
         self._stopping = True

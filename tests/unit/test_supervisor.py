@@ -15,7 +15,7 @@ SUPERVISE = """
 import signal, sys
 from rampe_guard.runtime.supervisor import Supervisor
 command = [sys.executable, "-c", sys.argv[1], *sys.argv[2:]]
-sys.exit(Supervisor(command, first_delay_s=0.05, longest_delay_s=0.15).run())
+sys.exit(Supervisor(command, first_delay_s=0.05, longest_delay_s=0.15, look_s=0.05).run())
 """
 COUNT = """
 import os, pathlib, signal, sys, time
@@ -81,6 +81,49 @@ sys.exit(2)
         "rampe-guard: the guard ended with exit code 1; it is started anew in 0.15 s",
         f"rampe-guard: the guard died of signal {number}; it is started anew in 0.15 s",
     ]
+
+
+HANG = """
+import faulthandler
+from rampe_guard.runtime.turning import Turning
+faulthandler.enable()
+turning = Turning()
+def stand_still():
+    time.sleep(60)
+"""
+
+
+def test_a_loop_that_stands_still_is_killed_says_where_and_is_started_anew(tmp_path: Path) -> None:
+    guard = f"""{HANG}
+if life == 0:
+    turning.feed(0.0)
+    stand_still()
+if life == 1:
+    turning.feed(0.0)
+    os.kill(os.getpid(), signal.SIGSTOP)
+sys.exit(2)
+"""
+    with supervise(tmp_path, guard) as parent:
+        assert parent.popen.wait(20.0) == 2
+        assert "in stand_still" in parent.err
+        assert parent.err.count("the guard hung and was killed; it is started anew") == 2
+    assert lives(tmp_path) == ["None", "a hang", "a hang"]
+
+
+def test_neither_loading_nor_saving_is_a_hang(tmp_path: Path) -> None:
+    guard = f"""{HANG}
+time.sleep(1.0)  # loads, twice as long as a hang
+for turn in range(20):
+    turning.feed(float(turn))
+    time.sleep(0.05)
+turning.end()
+time.sleep(1.0)  # saves
+sys.exit(0)
+"""
+    with supervise(tmp_path, guard) as parent:
+        assert parent.popen.wait(20.0) == 0
+        assert parent.err == ""
+    assert lives(tmp_path) == ["None"]
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
