@@ -7,6 +7,7 @@ import faulthandler
 import os
 import sys
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 from rampe_guard import __version__
 from rampe_guard.errors import RampeGuardError
@@ -16,15 +17,20 @@ from rampe_guard.options import (
     add_demo,
     add_evaluate,
     add_log_format,
+    add_metrics,
     add_model_actions,
     add_notify,
     add_operator,
     add_record,
     add_replay,
+    add_scene_actions,
     add_site,
     add_watch,
     positive_int,
 )
+
+if TYPE_CHECKING:
+    from rampe_guard.runtime.connecting import Network
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -87,7 +93,7 @@ def _run(args: argparse.Namespace) -> int:
         from rampe_guard.runtime.say import configure
 
         configure(args.log_format)
-        return lambda: run(args.site, args.connect, stop, args.operator)
+        return lambda: run(args.site, args.connect, stop, args.operator, args.metrics)
 
     guard = stop.unless_stopped(imported)
     return 0 if guard is None else guard()
@@ -118,12 +124,18 @@ def _watch(args: argparse.Namespace) -> int:
     if len(args.site) == 1 and not args.base and not args.json:
         from rampe_guard.programs.watch_one import watch_one
 
-        return watch_one(args.site[0], args.connect, Console(), stop, bell=args.bell)
+        return watch_one(args.site[0], _network(args), Console(), stop, bell=args.bell)
     from rampe_guard.programs.control_room import watch_many
 
     return watch_many(
-        args.site, args.base, args.connect, Console(), stop, bell=args.bell, as_json=args.json
+        args.site, args.base, _network(args), Console(), stop, bell=args.bell, as_json=args.json
     )
+
+
+def _network(args: argparse.Namespace) -> Network:
+    from rampe_guard.runtime.connecting import Network
+
+    return Network(tuple(args.connect), args.zenoh, args.plain_network)
 
 
 def _dashboard(args: argparse.Namespace) -> int:
@@ -146,7 +158,7 @@ def _notify(args: argparse.Namespace) -> int:
     wishes = Wishes(
         args.site,
         args.base,
-        args.connect,
+        _network(args),
         Level[args.at_least.upper()],
         args.commands,
         args.post,
@@ -222,9 +234,22 @@ def _model(args: argparse.Namespace) -> int:
     if args.action == "export":
         print(export_model(args.site, args.operator).decode())
         return 0
+    if args.action == "reset" and args.running:
+        from rampe_guard.programs.watching import forget
+
+        print(forget(args.site, args.connect, args.operator, args.who))
+        return 0
     if args.action == "reset":
         return reset_model(args.site, args.operator, Console(soft_wrap=True), sure=args.yes)
     return show_model(args.site, args.operator, Console())
+
+
+def _scene(args: argparse.Namespace) -> int:
+    from rampe_guard.programs.scene_putting import put_scene, show_scene
+
+    if args.action == "put":
+        return put_scene(args.site, args.connect, args.file, args.who)
+    return show_scene(args.site, args.connect)
 
 
 def _schema(args: argparse.Namespace) -> int:
@@ -271,6 +296,7 @@ def _parser() -> argparse.ArgumentParser:
     add_site(run, connect=True)
     add_operator(run)
     add_log_format(run)
+    add_metrics(run)
     run.add_argument(
         "--no-supervisor",
         dest="supervisor",
@@ -307,6 +333,8 @@ def _parser() -> argparse.ArgumentParser:
     paper.add_argument("--cycles", type=positive_int, default=23, help="of a run (default 23)")
     paper.add_argument("--seed", type=positive_int, default=1, help="of the first run (default 1)")
 
+    scene = commands.add_parser("scene", help="the scene in force of a guard that works")
+    add_scene_actions(scene)
     model = commands.add_parser("model", help="what is kept of an operator's way of working")
     add_model_actions(model)
 
@@ -341,6 +369,7 @@ _COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "evaluate": _evaluate,
     "paper": _paper,
     "model": _model,
+    "scene": _scene,
     "schema": _schema,
     "access": _access,
     "ack": _ack,

@@ -18,6 +18,7 @@ def add_watch(watch: argparse.ArgumentParser) -> None:
         help="guards by the prefix of their keys, such as 'rampe/*/*/guard'",
     )
     add_connect(watch)
+    add_network(watch)
     watch.add_argument("--bell", action="store_true", help="ring the terminal's bell")
     watch.add_argument("--json", action="store_true", help="one JSON object a line, for scripts")
 
@@ -33,6 +34,7 @@ def add_notify(parser: argparse.ArgumentParser) -> None:
         help="machines by the prefix of their guards' keys, such as 'rampe/*/*/guard'",
     )
     add_connect(parser)
+    add_network(parser)
     add_log_format(parser)
     parser.add_argument(
         "--at-least",
@@ -80,6 +82,25 @@ def add_model_actions(model: argparse.ArgumentParser) -> None:
         add_operator(parser)
         if action == "reset":
             parser.add_argument("--yes", action="store_true", help="needed on a terminal")
+            parser.add_argument(
+                "--running", action="store_true", help="ask the guard that runs to forget"
+            )
+            add_connect(parser)
+            parser.add_argument("--who", help="who wants it so (default: the user's name)")
+
+
+def add_scene_actions(scene: argparse.ArgumentParser) -> None:
+    """What to do with the scene of a guard that works."""
+    actions = scene.add_subparsers(required=True, metavar="ACTION", dest="action")
+    for action, text in (
+        ("show", "print the scene in force"),
+        ("put", "replace it by another, which is validated first"),
+    ):
+        parser = actions.add_parser(action, help=text)
+        add_site(parser, connect=True)
+        if action == "put":
+            parser.add_argument("file", help="scene file (YAML)")
+            parser.add_argument("--who", help="who puts it (default: the user's name)")
 
 
 def add_evaluate(parser: argparse.ArgumentParser) -> None:
@@ -172,6 +193,20 @@ def add_connect(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_network(parser: argparse.ArgumentParser) -> None:
+    """How to join a network without a site file."""
+    parser.add_argument(
+        "--zenoh",
+        metavar="FILE",
+        help="Zenoh configuration file (json5; certificates, users) for --base, not --connect",
+    )
+    parser.add_argument(
+        "--plain-network",
+        action="store_true",
+        help="accept that anyone on the network of --connect can read and forge messages",
+    )
+
+
 def add_alert_requests(ack: argparse.ArgumentParser, shelve: argparse.ArgumentParser) -> None:
     """Which alert, and who asks."""
     for parser, who in ((ack, "who has seen it"), (shelve, "who wants it silent")):
@@ -189,6 +224,17 @@ def add_log_format(parser: argparse.ArgumentParser) -> None:
         choices=FORMATS,
         default="text",
         help="of the log on stderr: text, or one JSON object a line (default text)",
+    )
+
+
+def add_metrics(parser: argparse.ArgumentParser) -> None:
+    """Where Prometheus finds the guard."""
+    parser.add_argument(
+        "--metrics",
+        type=address,
+        metavar="[HOST:]PORT",
+        help="serve /metrics there for Prometheus, instead of where the site file says; on"
+        " 127.0.0.1 unless another host is given",
     )
 
 
@@ -212,6 +258,12 @@ def positive(text: str) -> float:
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is not above 0")
     return value
+
+
+def address(text: str) -> tuple[str, int]:
+    """A host, 127.0.0.1 if there is none, and a TCP port."""
+    host, _, number = text.rpartition(":")
+    return host.strip("[]") or "127.0.0.1", port(number)
 
 
 def port(text: str) -> int:

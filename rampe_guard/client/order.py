@@ -1,4 +1,4 @@
-"""What people ask of a guard about one alert."""
+"""What people ask of a guard: of one alert, or of what it learned."""
 
 from __future__ import annotations
 
@@ -8,16 +8,18 @@ from rampe_guard import wire
 from rampe_guard.errors import ConnectionFailedError
 from rampe_guard.runtime.zenoh_io import Bus
 
-Order: TypeAlias = wire.Ack | wire.Shelve
+Order: TypeAlias = wire.Ack | wire.Shelve | wire.Forget
+
+_WORDS = {wire.Ack: "ack", wire.Shelve: "shelve", wire.Forget: "forget"}
 
 
 def give(bus: Bus, base: str, order: Order, timeout_s: float = 2.0) -> bytes:
-    """Ask it of the guard at ``base``; returns the alert as it is then, as it came.
+    """Ask it of the guard at ``base``; returns its answer, as it came.
 
     Raises:
         ConnectionFailedError: no guard answers, or it refuses, with its reason.
     """
-    key = f"{base}/{'ack' if isinstance(order, wire.Ack) else 'shelve'}"
+    key = f"{base}/{_WORDS[type(order)]}"
     answers = bus.ask(key, wire.encode(order), timeout_s)
     if not answers:
         raise ConnectionFailedError(f"no guard answers on {key}")

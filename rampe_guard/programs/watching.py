@@ -1,4 +1,4 @@
-"""What people who watch say to a guard: ``ack`` and ``shelve``."""
+"""What people who watch say to a guard: ``ack``, ``shelve`` and ``model reset --running``."""
 
 from __future__ import annotations
 
@@ -32,6 +32,22 @@ def shelve(
     who = who or getpass.getuser()
     wish = wire.Shelve(alert_id=alert_id, who=who, duration_s=duration_s)
     return _ask(site_path, endpoints, wish)
+
+
+def forget(site_path: str, endpoints: Sequence[str], operator: str | None, who: str | None) -> str:
+    """Have the guard that runs forget all that it learned of its operator; says what that was.
+
+    Raises:
+        ConnectionFailedError: no router, no guard, or the guard refuses (with its reason).
+    """
+    site = connect_to(load_site(site_path), endpoints)
+    wish = wire.Forget(operator=operator or site.operator, who=who or getpass.getuser())
+    with Bus.open(site.zenoh) as bus:
+        told = wire.decode(give(bus, site.keys.base, wish), wire.Forgotten)
+    return (
+        f"forgotten: operator {told.operator!r} on {told.machine} at {told.site};"
+        f" {told.primitives} primitives, {told.situations} situations"
+    )
 
 
 def _ask(site_path: str, endpoints: Sequence[str], order: Order) -> int:

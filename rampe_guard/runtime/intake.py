@@ -7,8 +7,9 @@ input, and in what was learned meanwhile there is no trust.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
+from rampe_guard.core.scene import SolidObject
 from rampe_guard.core.types import InputName, Inputs
 from rampe_guard.errors import MessageError
 from rampe_guard.runtime.batch import Batch
@@ -33,6 +34,10 @@ class Stream:
         self._inbox = bus.inbox(key)
         self._budget = Budget(rate_hz, now_s)
         self._overruns = 0
+
+    def close(self) -> None:
+        """Hear nothing more."""
+        self._inbox.close()
 
     @property
     def overruns(self) -> int:
@@ -70,19 +75,24 @@ class Intake:
         keys = site.keys
         self._site = site
         self._say = say
-        self._rate_hz = rate_hz = site.guard.inputs.max_rate_hz
-        now_s = time.monotonic()
-
-        def stream(key: str) -> Stream:
-            return Stream(bus, key, rate_hz, now_s)
-
-        self._joystick = stream(keys.joystick)
-        self._actuators = stream(keys.actuators)
-        self._enabled = None if keys.enabled is None else stream(keys.enabled)
-        self._objects = [
-            (item.name, stream(item.key)) for item in site.scene.moving if item.key is not None
-        ]
+        self._bus = bus
+        self._rate_hz = site.guard.inputs.max_rate_hz
+        self._joystick = self._stream(keys.joystick)
+        self._actuators = self._stream(keys.actuators)
+        self._enabled = None if keys.enabled is None else self._stream(keys.enabled)
+        self._objects: list[tuple[str, Stream]] = []
+        self.change_objects(site.scene.moving)
         self._alive = None if keys.joystick_alive is None else bus.liveness(keys.joystick_alive)
+
+    def change_objects(self, moving: Iterable[SolidObject]) -> None:
+        """Hear of other objects from now on; a key that stays is heard without a gap."""
+        heard = {stream.key: stream for _, stream in self._objects}
+        wanted = [(item.name, item.key) for item in moving if item.key is not None]
+        self._objects = [
+            (name, heard.pop(key) if key in heard else self._stream(key)) for name, key in wanted
+        ]
+        for stream in heard.values():
+            stream.close()
 
     @property
     def overruns(self) -> int:
@@ -113,6 +123,9 @@ class Intake:
         if self._enabled is not None:
             self._read(batch, "enabled", self._enabled.take(now_s), batch.enabled)
         return batch.inputs(alive)
+
+    def _stream(self, key: str) -> Stream:
+        return Stream(self._bus, key, self._rate_hz, time.monotonic())
 
     def _read(
         self,

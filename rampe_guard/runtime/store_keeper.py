@@ -160,12 +160,22 @@ class Keeper:
         if situations is not None:
             self._situations.begin(file.path, situations, now_s)
 
+    @property
+    def failures(self) -> int:
+        """Saves that failed so far."""
+        return self._situations.failures + (0 if self._saver is None else self._saver.failures)
+
     def keep(self, now_s: float) -> None:
         """Have saved what was learned since the last save, if it is time; never waits."""
         if self._saver is not None and now_s >= self._due_s:
             self._due_s = now_s + self._site.memory.save_every_s
             self._save(self._saver)
         self._situations.keep(now_s)
+
+    def hurry(self) -> None:
+        """Have everything saved at the next turn: what was forgotten must not come back."""
+        self._due_s = float("-inf")
+        self._situations.hurry()
 
     def reasons(self) -> tuple[wire.Reason, ...]:
         """Why what is learned is not kept, for the heartbeat; a change is said on the log."""

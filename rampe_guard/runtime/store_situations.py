@@ -114,6 +114,11 @@ class SituationKeeper:
         """Why situations are not kept, None if they are."""
         return self._stuck or (None if self._saver is None else self._saver.problem)
 
+    @property
+    def failures(self) -> int:
+        """Saves that failed so far."""
+        return 0 if self._saver is None else self._saver.failures
+
     def begin(self, model: Path, memory: SituationMemory, now_s: float) -> None:
         """Recall what is beside the file of a model, and keep ``memory`` from now on."""
         file = self._file = situations_file(model)
@@ -141,6 +146,10 @@ class SituationKeeper:
         """Have saved what is new, if it is time; never waits."""
         if self._memory is not None and now_s >= self._due_s:
             self._due_s = now_s + max(SAVE_S, self.save() / _BYTES_PER_S)
+
+    def hurry(self) -> None:
+        """Have everything saved at the next turn."""
+        self._due_s = float("-inf")
 
     def save(self) -> int:
         """Have saved what is new, as soon as the disk is free; returns how much [bytes]."""

@@ -12,23 +12,32 @@ from __future__ import annotations
 import gc
 import os
 import time
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 
 from rampe_guard import wire
 from rampe_guard.assembly import Machine
 from rampe_guard.core.events import AlertEvent, Event, PredictionEvent
+from rampe_guard.core.rampe import Rampe
 from rampe_guard.core.situation_memory import SituationMemory
 from rampe_guard.core.types import Inputs
-from rampe_guard.errors import MessageError, RefusedError
+from rampe_guard.runtime.audit import Audit
 from rampe_guard.runtime.canary_watch import CanaryWatch
-from rampe_guard.runtime.health import Pulse, TimedSweeper
+from rampe_guard.runtime.health import Own, Pulse, TimedSweeper
 from rampe_guard.runtime.intake import Intake
 from rampe_guard.runtime.messages import Scribe
+from rampe_guard.runtime.metrics_start import Show
+from rampe_guard.runtime.minders import Minders
+from rampe_guard.runtime.orders import Orders
 from rampe_guard.runtime.replay import IDLE_STEP_S
+from rampe_guard.runtime.run_marker import RunMarker
 from rampe_guard.runtime.say import Sayer
+from rampe_guard.runtime.scene_builder import Built
+from rampe_guard.runtime.scene_desk import SceneDesk, Scenes
 from rampe_guard.runtime.store_keeper import Keeper
-from rampe_guard.runtime.zenoh_io import Bus, Request
+from rampe_guard.runtime.supervisor import restarted_after
+from rampe_guard.runtime.zenoh_io import Bus
 
 _WAKE_S = 0.001
 """Sleep between looks at the inboxes: adds half of it to the latency, costs 2 % of a core."""
@@ -49,7 +58,10 @@ class Worker:
         say: log.
         keeper: remembers what earlier runs learned, and keeps what this one learns.
         canary: is asked again and again whether this machine computes what is so.
-        restarted: after what the guard was started anew, if it was.
+        scenes: the scene in force, and who keeps another one.
+        minders: are told that the loop turns, and how the guard is.
+        marker: knows how the run before ended, and keeps what nobody has seen.
+        show: takes heartbeats for metrics.
     """
 
     def __init__(
@@ -59,26 +71,32 @@ class Worker:
         say: Sayer,
         keeper: Keeper,
         canary: CanaryWatch,
-        restarted: str | None = None,
+        scenes: Scenes,
+        minders: Minders,
+        marker: RunMarker,
+        *,
+        show: Show | None = None,
     ) -> None:
         site = machine.site
         base = site.keys.base
-        self._bus, self._say = bus, say
+        self._bus, self._say, self._minders = bus, say, minders
         boot = boot_id()
         start_s = time.monotonic()
         self._scribe = Scribe(site, boot, _unix_s)
         self._pulse = Pulse(site, boot, start_s, _unix_s, site.scene.content_hash)
         timed = TimedSweeper(machine.sweeper, self._pulse.sweep_ms)
         self._guard = machine.guard(start_s, boot, timed)
-        self._keeper, self._canary, self._restarted = keeper, canary, restarted
+        self._keeper, self._canary, self._marker, self._show = keeper, canary, marker, show
+        self._restarted = marker.after(restarted_after())
         keeper.begin(self._guard.rampe, start_s, self._guard.situations)
         self._intake = Intake(bus, site, say)
         self._alerts = bus.outbox(f"{base}/alert", "rampe.alert.v1", urgent=True)
         self._predictions = bus.outbox(f"{base}/prediction", "rampe.prediction.v1")
         self._beats = bus.outbox(f"{base}/heartbeat", "rampe.heartbeat.v1", urgent=True)
         self._states = bus.desk(f"{base}/state")
-        self._acks = bus.desk(f"{base}/ack")
-        self._shelves = bus.desk(f"{base}/shelve")
+        audit = Audit(say)
+        self._orders = Orders(bus, site, self._guard, audit, self._order_done, keeper.hurry)
+        self._scene = SceneDesk(bus, site, scenes, machine.sweeper, audit, self._change_scene)
         bus.declare_alive(f"{base}/alive")
         self._prediction: wire.Prediction | None = None
         self._status: str | None = None
@@ -95,6 +113,8 @@ class Worker:
         gc.freeze()  # meshes and models are for life: do not walk them at every collection
         last_step_s = last_beat_s = float("-inf")
         while not stopped() and not self._canary.told(now_s := time.monotonic()):
+            self._pulse.turn(now_s)
+            self._minders.turn(now_s)
             inputs = self._with_trial(self._intake.collect(now_s), now_s)
             if arrived(inputs) or now_s - last_step_s >= IDLE_STEP_S:
                 last_step_s = now_s
@@ -122,7 +142,7 @@ class Worker:
         for event in events:
             self._publish(event, compute_ms)
         if inputs.actuators:
-            self._pulse.loop_ms.add((time.perf_counter() - began) * 1e3)
+            self._pulse.step(now_s, (time.perf_counter() - began) * 1e3)
 
     def _publish(self, event: Event, compute_ms: float | None) -> None:
         if isinstance(event, AlertEvent):
@@ -139,6 +159,7 @@ class Worker:
         payload = wire.encode(message)
         self._alerts.put(payload)
         if event.kind == "transition":
+            self._marker.note(message)
             self._say.info(
                 f"{message.level}: {message.text}",
                 alert_id=message.alert_id,
@@ -150,22 +171,29 @@ class Worker:
         return payload
 
     def _beat(self, now_s: float) -> None:
-        self._pulse.tick += 1
         connected = self._bus.connected
-        extra = [*self._keeper.reasons()]
+        extra = [*self._keeper.reasons(), *self._scene.reasons(), *self._marker.reasons()]
         if not connected:
             extra.append(wire.Reason(code="no_router", text="no Zenoh router", key=None))
-        health = self._guard.snapshot(now_s).health
+        snapshot = self._guard.snapshot(now_s)
         self._heartbeat = self._pulse.beat(
-            health,
+            snapshot.health,
             now_s,
             self._intake.overruns,
             self._guard.lessons,
             extra,
             self._canary.trial(now_s),
             _remembered(self._guard.situations),
+            Own(
+                Counter(alert.level.word for alert in snapshot.alerts),
+                _learned(self._guard.rampe),
+                self._keeper.failures,
+                connected,
+            ),
         )
         self._beats.put(wire.encode(self._heartbeat))
+        if self._show is not None:
+            self._show(self._heartbeat, self._pulse, now_s)
         if connected is not self._connected:
             self._connected = connected
             self._say.info("Zenoh router is back" if connected else "Zenoh router is gone")
@@ -175,6 +203,7 @@ class Worker:
             codes = ",".join(r.code for r in self._heartbeat.reasons)
             text = f"status {self._status}{': ' + why if why else ''}"
             self._say.info(text, status=self._status, reasons=codes)
+            self._minders.status(text)
 
     def _answer(self, now_s: float) -> None:
         for request in self._states.drain():
@@ -184,43 +213,20 @@ class Worker:
             snapshot = self._guard.snapshot(now_s)
             state = self._scribe.state(self._heartbeat, snapshot, self._prediction)
             request.reply(wire.encode(state))
-        for request in self._acks.drain():
-            self._grant(request, self._acknowledge, now_s)
-        for request in self._shelves.drain():
-            self._grant(request, self._shelve, now_s)
+        self._orders.answer(now_s)
+        self._scene.answer()
 
-    def _grant(
-        self,
-        request: Request,
-        do: Callable[[bytes, float], tuple[AlertEvent, ...]],
-        now_s: float,
-    ) -> None:
-        """Do what somebody wants of an alert, and answer with the alert, or say why not."""
-        try:
-            events = do(request.payload or b"", now_s)
-        except (MessageError, RefusedError) as error:
-            request.refuse(str(error))
-            return
-        for event in events:
-            request.reply(self._publish_alert(event, None))
+    def _order_done(self, event: AlertEvent) -> bytes:
+        return self._publish_alert(event, None)
 
-    def _acknowledge(self, payload: bytes, now_s: float) -> tuple[AlertEvent, ...]:
-        ack = wire.decode(payload, wire.Ack, limit=wire.MAX_PAYLOAD_BYTES)
-        events = self._guard.acknowledge(ack.alert_id, ack.who, now_s)
-        if not events:
-            raise RefusedError(f"no alert {ack.alert_id!r} waits for an acknowledgement")
-        self._say.info(
-            f"{ack.alert_id} acknowledged by {ack.who}", alert_id=ack.alert_id, who=ack.who
-        )
-        return events
-
-    def _shelve(self, payload: bytes, now_s: float) -> tuple[AlertEvent, ...]:
-        wish = wire.decode(payload, wire.Shelve, limit=wire.MAX_PAYLOAD_BYTES)
-        events = self._guard.shelve(wish.alert_id, wish.who, wish.duration_s, now_s)
-        how = f"shelved for {wish.duration_s:g} s" if wish.duration_s else "no longer shelved"
-        text = f"{wish.alert_id} {how} by {wish.who}"
-        self._say.info(text, alert_id=wish.alert_id, who=wish.who, duration_s=wish.duration_s)
-        return events
+    def _change_scene(self, built: Built) -> None:
+        """Sweep against another scene from the next step on."""
+        scene = built.source.scene
+        timed = TimedSweeper(built.sweeper, self._pulse.sweep_ms)
+        self._guard.change_scene(timed, built.sweeper.zones, scene.moving)
+        self._intake.change_objects(scene.moving)
+        self._pulse.scene_hash = scene.content_hash
+        self._step(Inputs(), time.monotonic())
 
 
 def arrived(inputs: Inputs) -> bool:
@@ -228,6 +234,11 @@ def arrived(inputs: Inputs) -> bool:
     lists = (inputs.joystick, inputs.actuators, inputs.rejected)
     news = (inputs.canary, inputs.restarted)
     return any((*lists, inputs.objects, inputs.objects_rejected, inputs.enabled, *news))
+
+
+def _learned(rampe: Rampe) -> wire.Learned:
+    counts = rampe.categories
+    return wire.Learned(categories=len(counts), occurrences=int(sum(counts.values())))
 
 
 def _remembered(memory: SituationMemory) -> wire.Remembered:

@@ -13,22 +13,22 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, Literal, Self, TypeVar
+from typing import Any, Self, TypeVar
 
 import zenoh
 
 from rampe_guard.errors import ConnectionFailedError, MessageError, SettingsError
+from rampe_guard.runtime import zenoh_rules
+from rampe_guard.runtime.zenoh_config import blank, parts
 from rampe_guard.settings import ZenohSettings
+from rampe_guard.settings.network import redacted, shown
 
 T = TypeVar("T")
 
-_TRY_MS = 1000
-"""One attempt to connect; longer ones cannot be interrupted by a signal."""
+_CHANGES = 16
+"""Comings and goings of a token that wait, and that are looked at once."""
 _TOKEN_GRACE_S = 1.0
 """Existing tokens are told of within milliseconds after the subscription."""
-_QUEUE = 16
-"""Messages that may wait for a link, of each priority: Zenoh's most. Its default of 2 drops alerts
-of a third zone in the same step when the sending thread is late by a millisecond."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +60,10 @@ class Inbox:
             self.overruns += 1  # a full ring has most likely dropped some
         return messages
 
+    def close(self) -> None:
+        """Unsubscribe."""
+        self._subscriber.undeclare()
+
     def read(self, decoder: Callable[[bytes], T]) -> list[T]:
         """What waits and can be read, for viewers: what cannot, the guard tells of."""
         found = []
@@ -78,14 +82,16 @@ class Liveness:
 
     def __init__(self, session: zenoh.Session, key: str) -> None:
         self._subscriber = session.liveliness().declare_subscriber(
-            key, zenoh.handlers.RingChannel(16), history=True
+            key, zenoh.handlers.RingChannel(_CHANGES), history=True
         )
         self._known_at_s = time.monotonic() + _TOKEN_GRACE_S
         self.alive: bool | None = None
 
     def poll(self) -> bool | None:
         """The newest state; never blocks."""
-        while (sample := self._subscriber.try_recv()) is not None:
+        for _ in range(_CHANGES):  # a token that comes and goes all the time does not hold us up
+            if (sample := self._subscriber.try_recv()) is None:
+                break
             self.alive = sample.kind == zenoh.SampleKind.PUT
         if self.alive is None and time.monotonic() >= self._known_at_s:
             self.alive = False
@@ -169,6 +175,15 @@ class Request:
     payload: bytes | None
     _query: Any
 
+    def check_exact(self) -> None:
+        """See whether it was asked of this key alone, and not of all that a pattern matches.
+
+        Raises:
+            MessageError: ``wildcard_key``.
+        """
+        if (asked := str(self._query.key_expr)) != self.key:
+            raise MessageError("wildcard_key", f"asked on {asked!r}, expected {self.key!r}")
+
     def reply(self, payload: bytes) -> None:
         """Answer it."""
         with contextlib.suppress(zenoh.ZError):  # whoever asked may be gone
@@ -189,10 +204,10 @@ class Desk:
         self._key = key
         self._queryable = session.declare_queryable(key, zenoh.handlers.RingChannel(256))
 
-    def drain(self) -> list[Request]:
-        """All requests that wait; never blocks."""
-        requests = []
-        while (query := self._queryable.try_recv()) is not None:
+    def drain(self, most: int = 16) -> list[Request]:
+        """The oldest requests that wait, ``most`` at once: however many ask, the worker goes on."""
+        requests: list[Request] = []
+        while len(requests) < most and (query := self._queryable.try_recv()) is not None:
             payload = None if query.payload is None else query.payload.to_bytes()
             requests.append(Request(self._key, payload, query))
         return requests
@@ -212,15 +227,17 @@ class Bus:
 
         Raises:
             ConnectionFailedError: nobody answered.
-            SettingsError: the Zenoh configuration is not valid.
+            SettingsError: the Zenoh configuration is not valid, a certificate cannot be used, or
+                messages could be read and forged on their way.
         """
         config = _config(settings)
         client = json.loads(config.get_json("mode")) == "client"
         try:
             return cls(zenoh.open(config), client=client)
         except zenoh.ZError as error:
-            where = settings.config or ", ".join(settings.connect) or "no endpoint"
-            reason = str(error).split(" at /")[0]
+            named = (*zenoh_rules.endpoints(config.get_json, "connect"), *settings.connect)
+            where = settings.config or ", ".join(map(shown, settings.connect)) or "no endpoint"
+            reason = redacted(str(error), named).split(" at /")[0]
             raise ConnectionFailedError(f"no Zenoh router at {where}: {reason}") from None
 
     @classmethod
@@ -317,22 +334,40 @@ class Bus:
 
 
 @contextlib.contextmanager
-def router(endpoints: Sequence[str]) -> Iterator[None]:
-    """Be a Zenoh router on these endpoints (in a process of its own: it needs the whole GIL).
+def router(endpoints: Sequence[str], config_file: str | None = None) -> Iterator[None]:
+    """Be a Zenoh router (in a process of its own: it needs the whole GIL).
+
+    Args:
+        endpoints: to listen on.
+        config_file: the router's whole configuration instead.
 
     Raises:
-        ConnectionFailedError: an endpoint cannot be listened on.
+        SettingsError: the configuration file is not valid.
+        ConnectionFailedError: an endpoint cannot be listened on, or a certificate not be read.
     """
-    config = _blank("router")
-    config.insert_json5("listen/endpoints", json.dumps(list(endpoints)))
+    if config_file is None:
+        where, config = ", ".join(endpoints), zenoh.Config()
+        for path, value in (*blank("router"), ("listen/endpoints", json.dumps(list(endpoints)))):
+            config.insert_json5(path, value)
+    else:
+        where = config_file
+        try:
+            config = zenoh.Config.from_file(config_file)
+        except zenoh.ZError as error:
+            raise SettingsError(f"{where}: {str(error).split(' at /')[0]}") from None
     try:
         session = zenoh.open(config)
     except zenoh.ZError as error:
-        raise ConnectionFailedError(f"cannot listen on {', '.join(endpoints)}: {error}") from None
+        raise ConnectionFailedError(f"{where}: cannot route: {error}") from None
     try:
         yield
     finally:
         session.close()
+
+
+def log_as_told() -> None:
+    """Let Zenoh itself log what the environment variable RUST_LOG asks for, if it is set."""
+    zenoh.try_init_log_from_env()
 
 
 def check_configuration(settings: ZenohSettings) -> None:
@@ -364,35 +399,25 @@ def check_key_expression(text: str) -> None:
 
 def _config(settings: ZenohSettings) -> zenoh.Config:
     try:
-        return _unchecked_config(settings)
+        config = _unchecked_config(settings)
     except (zenoh.ZError, ValueError) as error:
-        where = settings.config or f"endpoints {', '.join(settings.connect)!r}"
-        reason = str(error).split(" at /")[0].splitlines()[0]
+        where = settings.config or f"endpoints {', '.join(map(shown, settings.connect))!r}"
+        reason = redacted(str(error), settings.connect).split(" at /")[0].splitlines()[0]
         raise SettingsError(
             f"zenoh: {where}: {reason}; endpoints look like tcp/127.0.0.1:7447"
         ) from None
-
-
-def _unchecked_config(settings: ZenohSettings) -> zenoh.Config:
-    if settings.config is not None:
-        config = zenoh.Config.from_file(settings.config)
-    else:
-        config = _blank(settings.mode)
-        config.insert_json5("connect/endpoints", json.dumps(list(settings.connect)))
-    config.insert_json5("connect/timeout_ms", str(_TRY_MS))
-    config.insert_json5("connect/exit_on_failure", "true")
-    retry = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2}
-    config.insert_json5("connect/retry", json.dumps(retry))
+    zenoh_rules.check_keys(config.get_json)
+    if settings.plain_network:
+        return config
+    zenoh_rules.check_exposure(config.get_json)
+    allowed = zenoh_rules.allowed_protocols(config.get_json)
+    if allowed:
+        config.insert_json5("transport/link/protocols", json.dumps(allowed))
     return config
 
 
-def _blank(mode: Literal["client", "peer", "router"]) -> zenoh.Config:
-    """A configuration that listens nowhere and finds nobody by itself."""
-    config = zenoh.Config()
-    config.insert_json5("mode", json.dumps(mode))
-    config.insert_json5("listen/endpoints", "[]")
-    config.insert_json5("scouting/multicast/enabled", "false")
-    config.insert_json5("scouting/gossip/enabled", "false")
-    for priority in ("real_time", "data"):
-        config.insert_json5(f"transport/link/tx/queue/size/{priority}", str(_QUEUE))
+def _unchecked_config(settings: ZenohSettings) -> zenoh.Config:
+    config = zenoh.Config() if settings.config is None else zenoh.Config.from_file(settings.config)
+    for path, value in parts(settings):
+        config.insert_json5(path, value)
     return config

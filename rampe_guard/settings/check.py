@@ -5,10 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from rampe_guard.settings.drive_model import impossible
+from rampe_guard.settings.network import PROVEN, protocol
 from rampe_guard.settings.problems import KeyPath, Problems, did_you_mean, show
-from rampe_guard.settings.site_model import ArmModel, ColumnModel, LogModel, SiteModel
+from rampe_guard.settings.site_model import (
+    ArmModel,
+    ColumnModel,
+    LogModel,
+    SiteModel,
+    TlsModel,
+    ZenohModel,
+)
 
-PUBLISHED = ("alert", "prediction", "heartbeat", "state", "scene", "ack", "shelve", "alive")
+PUBLISHED = (
+    *("alert", "prediction", "heartbeat", "state", "scene", "scene/put", "ack", "shelve"),
+    *("forget", "alive", "recorder"),
+)
 """What the guard publishes or answers under its base key."""
 
 _WILD = "*$?#"
@@ -74,6 +85,8 @@ def wrong_key(key: str) -> str | None:
 
 def _zenoh(model: SiteModel, problems: Problems) -> None:
     zenoh = model.zenoh
+    if zenoh.tls is not None:
+        _tls(zenoh, zenoh.tls, problems)
     if zenoh.config is not None:
         if zenoh.connect is not None:
             what = "stands beside a config file"
@@ -81,6 +94,19 @@ def _zenoh(model: SiteModel, problems: Problems) -> None:
     elif zenoh.connect == ():
         what = "names no endpoint, and scouting is off"
         problems.add(("zenoh", "connect"), what, "give one, such as tcp/127.0.0.1:7447")
+
+
+def _tls(zenoh: ZenohModel, tls: TlsModel, problems: Problems) -> None:
+    if (tls.certificate is None) != (tls.key is None):
+        given, missing = ("certificate", "key") if tls.key is None else ("key", "certificate")
+        what = f"is given without {missing}"
+        problems.add(("zenoh", "tls", given), what, "give both, or neither")
+    if zenoh.config is not None:
+        what = "stands beside a config file"
+        problems.add(("zenoh", "tls"), what, "put the certificates into that file")
+    elif not any(protocol(end) in PROVEN for end in zenoh.connect or ()):
+        what = "is given, and no endpoint uses it"
+        problems.add(("zenoh", "tls"), what, "connect to one such as tls/router.example:7447")
 
 
 def _rampe(model: SiteModel, problems: Problems) -> None:

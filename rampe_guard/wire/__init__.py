@@ -8,15 +8,18 @@ site's units.
 from rampe_guard.wire.ack import Ack
 from rampe_guard.wire.alert import Alert, by_urgency
 from rampe_guard.wire.codec import MAX_PAYLOAD_BYTES, decode, encode
+from rampe_guard.wire.forget import Forget, Forgotten
 from rampe_guard.wire.health import (
     CanaryTrial,
     Heartbeat,
     InputAges,
     InputRates,
+    Learned,
     ObjectInput,
     Quantiles,
     Reason,
     Remembered,
+    Resources,
 )
 from rampe_guard.wire.inputs import (
     ActuatorsMessage,
@@ -30,6 +33,7 @@ from rampe_guard.wire.inputs import (
 )
 from rampe_guard.wire.prediction import Endpoint, Prediction, PredictionSweep, Scenario
 from rampe_guard.wire.recorder import Recorder
+from rampe_guard.wire.scene import MAX_SCENE_BYTES, SceneInForce, ScenePut
 from rampe_guard.wire.schema import json_schemas
 from rampe_guard.wire.shelve import Shelve
 from rampe_guard.wire.state import State
@@ -38,6 +42,7 @@ from rampe_guard.wire.text import MAX_TEXT, alert_text
 
 __all__ = [
     "MAX_PAYLOAD_BYTES",
+    "MAX_SCENE_BYTES",
     "MAX_TEXT",
     "Ack",
     "ActuatorsMessage",
@@ -45,10 +50,13 @@ __all__ = [
     "CanaryTrial",
     "EnabledMessage",
     "Endpoint",
+    "Forget",
+    "Forgotten",
     "Heartbeat",
     "InputAges",
     "InputRates",
     "JoystickMessage",
+    "Learned",
     "ObjectInput",
     "ObjectPose",
     "Prediction",
@@ -57,7 +65,10 @@ __all__ = [
     "Reason",
     "Recorder",
     "Remembered",
+    "Resources",
     "Scenario",
+    "SceneInForce",
+    "ScenePut",
     "Shelve",
     "State",
     "SweepReply",

@@ -139,6 +139,32 @@ KEYS: Final[tuple[Key, ...]] = (
         "rampe.alert.v1",
     ),
     Key(
+        "scene",
+        "{base}/scene",
+        "answered",
+        "The keep-out scene in force. Its hash is in every heartbeat: ask again when it changes.",
+        None,
+        "rampe.scene.v1",
+    ),
+    Key(
+        "scenePut",
+        "{base}/scene/put",
+        "answered",
+        "Replace the scene while the guard works; the answer is the scene then in force, or every"
+        " error in words, and the old one stays. A key of its own, so that a router's access list"
+        " can tell who may.",
+        "rampe.scene_put.v1",
+        "rampe.scene.v1",
+    ),
+    Key(
+        "forget",
+        "{base}/forget",
+        "answered",
+        "Forget all that was learned of the operator; the answer tells how much that was.",
+        "rampe.forget.v1",
+        "rampe.forgotten.v1",
+    ),
+    Key(
         "alive",
         "{base}/alive",
         "held",

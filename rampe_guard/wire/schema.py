@@ -8,10 +8,12 @@ import msgspec
 
 from rampe_guard.wire.ack import Ack
 from rampe_guard.wire.alert import Alert
+from rampe_guard.wire.forget import Forget, Forgotten
 from rampe_guard.wire.health import Heartbeat
 from rampe_guard.wire.inputs import ActuatorsMessage, EnabledMessage, JoystickMessage, ObjectPose
 from rampe_guard.wire.prediction import Prediction
 from rampe_guard.wire.recorder import Recorder
+from rampe_guard.wire.scene import SceneInForce, ScenePut
 from rampe_guard.wire.shelve import Shelve
 from rampe_guard.wire.state import State
 from rampe_guard.wire.sweep import SweepReply, SweepRequest
@@ -25,6 +27,8 @@ _TAKEN: dict[str, type[msgspec.Struct]] = {
     "rampe.enabled.v1": EnabledMessage,
     "rampe.ack.v1": Ack,
     "rampe.shelve.v1": Shelve,
+    "rampe.scene_put.v1": ScenePut,
+    "rampe.forget.v1": Forget,
     "rampe.sweep_request.v1": SweepRequest,
 }
 _SENT: dict[str, type[msgspec.Struct]] = {
@@ -33,6 +37,8 @@ _SENT: dict[str, type[msgspec.Struct]] = {
     "rampe.heartbeat.v1": Heartbeat,
     "rampe.state.v1": State,
     "rampe.recorder.v1": Recorder,
+    "rampe.scene.v1": SceneInForce,
+    "rampe.forgotten.v1": Forgotten,
     "rampe.sweep_reply.v1": SweepReply,
 }
 

@@ -1,0 +1,79 @@
+"""``rampe-guard scene``: the scene in force of a guard that works, and another one for it."""
+
+from __future__ import annotations
+
+import getpass
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from rampe_guard import wire
+from rampe_guard.errors import ConnectionFailedError, MessageError, SettingsError
+from rampe_guard.runtime.connecting import connect_to
+from rampe_guard.runtime.zenoh_io import Bus
+from rampe_guard.settings import Site, load_scene_text, load_site
+from rampe_guard.settings.source import read_bytes
+
+_PUT_S = 330.0
+"""A mesh that must be wrapped takes a while."""
+
+
+def show_scene(site_path: str, endpoints: Sequence[str]) -> int:
+    """Print the text of the scene in force; on stderr, whose it is.
+
+    Raises:
+        ConnectionFailedError: no router, no guard, or the guard refuses (with its reason).
+    """
+    site = connect_to(load_site(site_path), endpoints)
+    found = _asked(site, "scene", None, 2.0)
+    sys.stderr.write(f"{_facts(found, site)}\n")
+    sys.stdout.write(found.scene or "")
+    return 0
+
+
+def put_scene(site_path: str, endpoints: Sequence[str], file: str, who: str | None) -> int:
+    """Have the guard sweep against the scene of a file from now on.
+
+    Its meshes are named as seen from the site's own scene file, wherever ``file`` lies.
+
+    Raises:
+        SettingsError: the file is wrong.
+        ConnectionFailedError: no router, no guard, or the guard refuses (with its reason).
+    """
+    site = connect_to(load_site(site_path), endpoints)
+    content = read_bytes(file, "scene file")
+    load_scene_text(content, site, name=file)  # what can be told here is told with its file
+    try:
+        text = content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise SettingsError(f"{file}: not UTF-8: {error}") from None
+    wish = wire.ScenePut(scene=text, who=who or getpass.getuser())
+    found = _asked(site, "scene/put", wire.encode(wish), _PUT_S)
+    for note in found.notes:
+        sys.stderr.write(f"{note}\n")
+    sys.stdout.write(f"{_facts(found, site)}\n")
+    return 0
+
+
+def _asked(site: Site, word: str, payload: bytes | None, timeout_s: float) -> wire.SceneInForce:
+    key = f"{site.keys.base}/{word}"
+    with Bus.open(site.zenoh) as bus:
+        answers = bus.ask(key, payload, timeout_s)
+    if not answers:
+        raise ConnectionFailedError(f"no guard answers on {key}")
+    try:
+        return wire.decode(answers[0], wire.SceneInForce)
+    except MessageError as error:
+        raise ConnectionFailedError(f"{key} answered what is no scene: {error}") from None
+
+
+def _facts(found: wire.SceneInForce, site: Site) -> str:
+    if found.put_by is None or found.put_unix_s is None:
+        whose = f"its own, {Path(site.scene.path).name}"
+    else:
+        when = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(found.put_unix_s))
+        whose = f"put by {found.put_by} at {when}"
+        whose += ", kept" if found.kept else ", NOT kept: a guard that starts anew has its own"
+    zones = f"{len(found.zones)} zones"
+    return f"{found.machine} at {found.site}: {zones}, {found.scene_hash[:12]}, {whose}"

@@ -1,0 +1,147 @@
+"""The scene that was put over the network, kept so that a guard that starts anew has it too.
+
+It holds for as long as the site's own scene file stays as it was when it was put: who edits that
+file and starts the guard again means the file. A kept scene that cannot be used any more is told
+in every heartbeat, since the scene that then holds is not the one that somebody wanted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from rampe_guard.core.scene import Scene
+from rampe_guard.errors import ModelFileError, RampeGuardError
+from rampe_guard.runtime.say import Sayer
+from rampe_guard.runtime.store import ModelFile, model_folder
+from rampe_guard.settings import Site, load_scene_text
+from rampe_guard.settings.source import read_bytes
+from rampe_guard.wire import MAX_SCENE_BYTES
+
+_NAME: Final = "scene.kept.json"
+_FORMAT: Final = "rampe.scene_kept.v1"
+
+
+@dataclass(frozen=True, slots=True)
+class SceneText:
+    """A scene, the text that it was read from, and where that came from.
+
+    Attributes:
+        scene: as the sweeper is built from it.
+        text: of its file.
+        put_by: who put it; None if it is the site's own file.
+        put_unix_s: when [s].
+    """
+
+    scene: Scene
+    text: str
+    put_by: str | None = None
+    put_unix_s: float | None = None
+
+
+class _Kept(msgspec.Struct, frozen=True, kw_only=True):
+    format: str
+    instead_of: str
+    text: str
+    who: str
+    unix_s: float
+
+
+def own_scene(site: Site) -> SceneText:
+    """The site's own scene file, read again so that text and scene are the same.
+
+    Raises:
+        SettingsError: it cannot be read any more, or is wrong now.
+    """
+    content = read_bytes(site.scene.path, "scene file")
+    return SceneText(read_scene(content, site), content.decode("utf-8"))
+
+
+def read_scene(text: bytes | str, site: Site) -> Scene:
+    """A scene in the place of the site's own; `SettingsError` tells of every problem."""
+    return replace(load_scene_text(text, site), path=site.scene.path)
+
+
+class SceneKeeper:
+    """Keeps one machine's scene beside its models.
+
+    Args:
+        site: with its own scene.
+        say: log.
+
+    Attributes:
+        problem: why the scene in force is not the one that was put last; None if all is well.
+    """
+
+    def __init__(self, site: Site, say: Sayer) -> None:
+        self._site, self._say = site, say
+        self._own_hash = site.scene.content_hash
+        self.problem: str | None = None
+
+    def recall(self) -> SceneText:
+        """The scene that holds when a guard starts.
+
+        Raises:
+            SettingsError: the site's own scene cannot be read any more.
+        """
+        own = own_scene(self._site)
+        self._own_hash = own.scene.content_hash
+        if not self._site.memory.enabled:
+            return own
+        try:
+            content = self._file().read()
+            if content is None:
+                return own
+            kept = _decode(content)
+            if kept.instead_of != self._own_hash:
+                self._say.info(f"the scene that {kept.who} put gives way to a newer scene file")
+                return own
+            scene = read_scene(kept.text, self._site)
+        except RampeGuardError as error:
+            return self.give_up(error)
+        self._say.info(f"the scene is the one that {kept.who} put", put_by=kept.who)
+        return SceneText(scene, kept.text, kept.who, kept.unix_s)
+
+    def give_up(self, error: RampeGuardError) -> SceneText:
+        """The site's own scene instead of one that cannot be used any more."""
+        self.problem = f"the scene that was put last cannot be used: {error}; put it again"
+        self._say.warn("scene", self.problem)
+        return own_scene(self._site)
+
+    def keep(self, found: SceneText) -> bool:
+        """Keep a scene that was put; whether that could be done (else `problem` tells why not)."""
+        if not self._site.memory.enabled:
+            self.problem = None
+            return False
+        kept = _Kept(
+            format=_FORMAT,
+            instead_of=self._own_hash,
+            text=found.text,
+            who=found.put_by or "",
+            unix_s=found.put_unix_s or 0.0,
+        )
+        try:
+            with self._file() as file:
+                file.write(msgspec.json.encode(kept))
+        except ModelFileError as error:
+            self.problem = f"the scene that was put is lost when the guard starts anew: {error}"
+            self._say.warn("scene", self.problem)
+            return False
+        self.problem = None
+        return True
+
+    def _file(self) -> ModelFile:
+        return ModelFile(model_folder(self._site) / Path(_NAME), MAX_SCENE_BYTES)
+
+
+def _decode(content: bytes) -> _Kept:
+    try:
+        kept = msgspec.json.decode(content, type=_Kept)
+    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+        raise ModelFileError(f"its file is damaged: {error}") from None
+    if kept.format != _FORMAT:
+        raise ModelFileError(f"its file is {kept.format!r}, need {_FORMAT!r}")
+    return kept
