@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -11,6 +12,8 @@ import numpy as np
 from rampe_guard import __version__, wire
 from rampe_guard.core.monitor import Health, ObjectHealth, Status
 from rampe_guard.core.types import FloatArray, PathSweeper, Placement, SweepResult
+from rampe_guard.runtime.pace import Pace
+from rampe_guard.runtime.resources import resources
 from rampe_guard.settings import Site
 
 _TIMES = 1000
@@ -18,15 +21,28 @@ _TIMES = 1000
 _RATE_WINDOW_S = 2.0
 
 
+BUCKETS_MS = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
+"""Upper ends of the buckets in which durations are counted for good; one more has no end."""
+
+
 class Durations:
-    """The newest durations [ms] of something, and their quantiles."""
+    """The newest durations [ms] of something and their quantiles; all of them, counted.
+
+    Attributes:
+        counts: how many fell in each of `BUCKETS_MS`, and beyond the last.
+        total_ms: sum of all.
+    """
 
     def __init__(self) -> None:
         self._values: deque[float] = deque(maxlen=_TIMES)
+        self.counts = [0] * (len(BUCKETS_MS) + 1)
+        self.total_ms = 0.0
 
     def add(self, milliseconds: float) -> None:
         """Note one."""
         self._values.append(milliseconds)
+        self.counts[bisect_left(BUCKETS_MS, milliseconds)] += 1
+        self.total_ms += milliseconds
 
     def quantiles(self) -> wire.Quantiles | None:
         """Median and 99th percentile [ms]; None before the first."""
@@ -90,6 +106,19 @@ class Rates:
         return rate
 
 
+@dataclass(frozen=True, slots=True)
+class Own:
+    """What the daemon knows of itself; see the fields of the heartbeat of the same names."""
+
+    alerts: Mapping[str, int] | None = None
+    learned: wire.Learned | None = None
+    save_failures: int | None = None
+    router: bool | None = None
+
+
+_NOTHING = Own()
+
+
 @dataclass
 class Pulse:
     """Makes heartbeats.
@@ -110,9 +139,20 @@ class Pulse:
         self.loop_ms = Durations()
         self.sweep_ms = Durations()
         self.tick = 0
+        self._pace = Pace()
         self._rates = Rates()
         self._object_rates = Rates()
         self._seq = 0
+
+    def turn(self, now_s: float) -> None:
+        """The worker loop begins another turn."""
+        self.tick += 1
+        self._pace.turn(now_s)
+
+    def step(self, now_s: float, took_ms: float) -> None:
+        """A step with a new position that began at ``now_s`` [s] took so long [ms]."""
+        self.loop_ms.add(took_ms)
+        self._pace.step(now_s, took_ms)
 
     def beat(
         self,
@@ -123,6 +163,7 @@ class Pulse:
         extra: Iterable[wire.Reason] = (),
         canary: wire.CanaryTrial | None = None,
         memory: wire.Remembered | None = None,
+        knows: Own = _NOTHING,
     ) -> wire.Heartbeat:
         """A heartbeat; ``extra`` are reasons that only the daemon knows (no router, say)."""
         self._seq += 1
@@ -132,7 +173,9 @@ class Pulse:
             wire.Reason(code=r.code, text=r.text, key=keys[r.input] if r.input else r.key)
             for r in health.reasons
         ]
-        more = [] if health.off else list(extra)  # what is off has no other weakness
+        more = (
+            [] if health.off else [*extra, *self._pace.reasons(now_s)]
+        )  # what is off has no other weakness
         status = Status.DEGRADED if more and health.status is Status.OK else health.status
         rejected: dict[str, dict[str, int]] = {}
         for (name, reason), count in health.rejected.items():
@@ -157,6 +200,12 @@ class Pulse:
             primitives=primitives,
             memory=memory,
             drops=overruns,
+            alerts=None if knows.alerts is None else dict(knows.alerts),
+            learned=knows.learned,
+            save_failures=knows.save_failures,
+            router=knows.router,
+            resources=resources(),
+            steps=sum(self.loop_ms.counts),
             loop_ms=self.loop_ms.quantiles(),
             sweep_ms=self.sweep_ms.quantiles(),
             tick=self.tick,

@@ -203,6 +203,19 @@ class ModelFile:
                 self._temporary.unlink(missing_ok=True)
             raise ModelFileError(f"{self.path}: {error.strerror or error}") from None
 
+    def remove(self) -> None:
+        """Delete the file, if there is one, durably.
+
+        Raises:
+            ModelFileError: it could not be deleted.
+        """
+        self._check_lock()
+        try:
+            self.path.unlink(missing_ok=True)
+            self._sync_folder()
+        except OSError as error:
+            raise ModelFileError(f"{self.path}: {error.strerror or error}") from None
+
     def set_aside(self) -> Path:
         """Rename the file to a ``.refused-N`` that does not exist yet; returns that.
 

@@ -32,11 +32,13 @@ class Saver(Generic[_Mark]):
     Attributes:
         taken: mark of the file as it is, or will be once what was given is written.
         problem: why the last save failed; None if it did not.
+        failures: saves that failed so far.
     """
 
     def __init__(self, file: ModelFile, saved: _Mark) -> None:
         self.taken = self._saved = saved
         self.problem: str | None = None
+        self.failures = 0
         self._file = file
         self._next: Save[_Mark] | None = None
         self._over = False
@@ -65,6 +67,7 @@ class Saver(Generic[_Mark]):
             try:
                 self._file.write(save.content())
             except (ModelFileError, ValueError, MemoryError) as error:
+                self.failures += 1
                 self.problem = str(error) or type(error).__name__
                 self.taken = self._saved  # to be given again
             else:
