@@ -34,6 +34,8 @@ class Alerts:
         base: key expression(s) of the prefixes of guards. A machine named without wildcards is
             told as unavailable if nothing is heard of it.
         config: a Zenoh configuration file (TLS, users), instead of ``connect``.
+        plain_network: accept endpoints without certificates that are not on this machine: anyone
+            on that network can read and forge messages.
         repeats: give the repeats of active alerts too (5 Hz each).
         timeout_s: how long to wait for a router, and for an answer of a guard [s].
         expires_after_s: age at which a heartbeat (5 Hz) must not be trusted [s].
@@ -45,12 +47,13 @@ class Alerts:
         base: str | Sequence[str] = EVERYONE,
         *,
         config: str | Path | None = None,
+        plain_network: bool = False,
         repeats: bool = False,
         timeout_s: float = 2.0,
         expires_after_s: float = 1.0,
     ) -> None:
         self._stream = Stream(
-            network(connect, config),
+            network(connect, config, plain=plain_network),
             several(base),
             repeats=repeats,
             timeout_s=timeout_s,
@@ -110,9 +113,12 @@ class Alerts:
         self.close()
 
 
-def network(connect: str | Sequence[str], config: str | Path | None) -> ZenohSettings:
+def network(
+    connect: str | Sequence[str], config: str | Path | None, *, plain: bool
+) -> ZenohSettings:
     """How to join: a configuration file, or endpoints as a client."""
-    return ZenohSettings(None if config is None else str(config), "client", several(connect))
+    file, ends = (None, several(connect)) if config is None else (str(config), ())
+    return ZenohSettings(file, "client", ends, plain_network=plain)
 
 
 def several(names: str | Sequence[str]) -> tuple[str, ...]:

@@ -28,6 +28,7 @@ class AsyncAlerts:
         base: str | Sequence[str] = EVERYONE,
         *,
         config: str | Path | None = None,
+        plain_network: bool = False,
         repeats: bool = False,
         timeout_s: float = 2.0,
         expires_after_s: float = 1.0,
@@ -35,7 +36,7 @@ class AsyncAlerts:
         self._news = asyncio.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._stream = Stream(
-            network(connect, config),
+            network(connect, config, plain=plain_network),
             several(base),
             repeats=repeats,
             timeout_s=timeout_s,

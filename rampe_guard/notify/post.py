@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import http.client
 import json
+import re
 import urllib.error
 import urllib.request
+from base64 import b64encode
 from typing import Any
-from urllib.parse import urlsplit
+from urllib.parse import unquote, urlsplit
 
 from rampe_guard.errors import SettingsError
 from rampe_guard.notify.choose import Notice
@@ -39,10 +41,14 @@ class Post:
         except ValueError:
             good = False
         if not good:
-            raise SettingsError(f"{url!r} is no URL such as http://127.0.0.1:8080/alerts")
-        where = parts.netloc.rpartition("@")[2]
+            bare = re.sub("//[^/]*@", "//…@", url).partition("?")[0]
+            raise SettingsError(f"{bare!r} is no URL such as http://127.0.0.1:8080/alerts")
+        user, _, where = parts.netloc.rpartition("@")
         self.name = f"{parts.scheme}://{where}"  # the rest may be a secret
-        self._url, self._timeout_s = url, timeout_s
+        self._url, self._timeout_s = parts._replace(netloc=where).geturl(), timeout_s
+        self._head = {"Content-Type": "application/json", "User-Agent": "rampe-guard"}
+        if user:  # urllib would take it for a part of the host, and say so in its errors
+            self._head["Authorization"] = f"Basic {b64encode(unquote(user).encode()).decode()}"
         self._opener = urllib.request.build_opener(_NoRedirect())
 
     def tell(self, notice: Notice) -> None:
@@ -52,18 +58,19 @@ class Post:
             NotHeardError: no answer, or not a good one.
         """
         body = json.dumps(notice.body, ensure_ascii=False).encode()
-        head = {"Content-Type": "application/json", "User-Agent": "rampe-guard"}
         try:
-            request = urllib.request.Request(self._url, body, head)  # noqa: S310 - checked above
+            request = urllib.request.Request(self._url, body, self._head)  # noqa: S310 - http(s)
             with self._opener.open(request, timeout=self._timeout_s):
                 return
         except urllib.error.HTTPError as error:
             code = error.code
             error.close()
             raise NotHeardError(f"{self.name} answered {code}") from None
-        except (OSError, http.client.HTTPException, ValueError) as error:
+        except OSError as error:
             reason = getattr(error, "reason", None) or error
             raise NotHeardError(f"{self.name}: {reason}") from None
+        except (http.client.HTTPException, ValueError) as error:  # their words quote the URL
+            raise NotHeardError(f"{self.name}: {type(error).__name__}") from None
 
     def stop(self) -> None:
         """Nothing to break off: its thread ends with the process."""

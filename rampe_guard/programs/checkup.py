@@ -18,6 +18,7 @@ from rampe_guard.runtime.loading import load_telling
 from rampe_guard.runtime.store import model_path
 from rampe_guard.runtime.zenoh_io import check_configuration
 from rampe_guard.settings import Site, load_site
+from rampe_guard.settings.network import shown
 
 
 def checkup(site_path: str, console: Console) -> int:
@@ -80,7 +81,10 @@ def _keys(site: Site) -> Table:
     for item in site.scene.moving:
         table.add_row(f"poses of {item.name}", item.key)
     table.add_row("published under", site.keys.base)
-    table.add_row("zenoh", site.zenoh.config or f"{site.zenoh.mode} {' '.join(site.zenoh.connect)}")
+    table.add_row(
+        "zenoh",
+        site.zenoh.config or f"{site.zenoh.mode} {' '.join(map(shown, site.zenoh.connect))}",
+    )
     table.add_row("learned models", str(model_path(site)) if site.memory.enabled else "not kept")
     return table
 

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from rich.console import Console
 
 from rampe_guard.errors import SettingsError
-from rampe_guard.runtime.connecting import connect_to
+from rampe_guard.runtime.connecting import Network
 from rampe_guard.runtime.stopping import StopFlag
-from rampe_guard.settings import DEFAULT_ENDPOINT, Site, ZenohSettings, load_site
+from rampe_guard.settings import Site, ZenohSettings, load_site
 from rampe_guard.view.links import Link
 from rampe_guard.view.wall import Wall
 from rampe_guard.view.wall_watch import watch_json, watch_wall
@@ -19,7 +19,7 @@ from rampe_guard.view.wall_watch import watch_json, watch_wall
 def watch_many(
     site_paths: Sequence[str],
     bases: Sequence[str],
-    endpoints: Sequence[str],
+    network: Network,
     console: Console,
     stop: StopFlag,
     *,
@@ -31,7 +31,7 @@ def watch_many(
     Args:
         site_paths: site files.
         bases: key expressions of prefixes of guards, beside the sites'.
-        endpoints: Zenoh endpoints, instead of the site files'.
+        network: how to join, instead of as the site files say.
         console: where to.
         stop: ends it.
         bell: ring the terminal's bell.
@@ -44,10 +44,10 @@ def watch_many(
         raise SettingsError("nothing to watch: name a site file, or --base 'rampe/*/*/guard'")
     if bell and (as_json or not console.is_terminal):
         raise SettingsError("--bell rings a terminal's bell, and the output is no terminal")
-    sites = [connect_to(load_site(path), endpoints) for path in site_paths]
+    sites = [network.of(load_site(path)) for path in site_paths]
     names = {site.keys.base: (site.machine, site.name) for site in sites}
     with contextlib.ExitStack() as stack:
-        links = [stack.enter_context(link) for link in _links(sites, bases, endpoints)]
+        links = [stack.enter_context(link) for link in _links(sites, bases, network)]
         if as_json:
             watch_json(links, stop)
         else:
@@ -56,15 +56,14 @@ def watch_many(
     return 0
 
 
-def _links(sites: Sequence[Site], bases: Sequence[str], endpoints: Sequence[str]) -> list[Link]:
+def _links(sites: Sequence[Site], bases: Sequence[str], network: Network) -> list[Link]:
     """One for each way to join a network."""
     ways: dict[ZenohSettings, list[str]] = {}
     for site in sites:
         ways.setdefault(site.zenoh, []).append(site.keys.base)
     if bases:
         # beside site files their own network is meant
-        known = list(ways) if not endpoints else []
-        free = known or [ZenohSettings(None, "client", tuple(endpoints) or (DEFAULT_ENDPOINT,))]
-        for way in free:
+        known = list(ways) if not network.said else []
+        for way in known or [network.settings]:
             ways.setdefault(way, []).extend(bases)
     return [Link(way, list(dict.fromkeys(wanted))) for way, wanted in ways.items()]

@@ -26,12 +26,12 @@ from rampe_guard.notify.post import Post
 from rampe_guard.notify.sound import Sound, sounding
 from rampe_guard.notify.target import Target
 from rampe_guard.notify.tones import UNPROTECTED
-from rampe_guard.runtime.connecting import connect_to
+from rampe_guard.runtime.connecting import Network
 from rampe_guard.runtime.log_lines import LogFormat, configure
 from rampe_guard.runtime.say import Sayer
 from rampe_guard.runtime.stopping import StopFlag
 from rampe_guard.runtime.zenoh_io import Bus, is_pattern
-from rampe_guard.settings import DEFAULT_ENDPOINT, ZenohSettings, load_site
+from rampe_guard.settings import ZenohSettings, load_site
 
 _WAKE_S = 0.01
 _GRACE_S = 2.0
@@ -45,7 +45,7 @@ class Wishes:
     Attributes:
         site: path of a site file, or None.
         bases: key expressions of prefixes of guards, besides the site's.
-        connect: endpoints instead of the site's.
+        network: how to join, instead of as the site file says.
         at_least: level from which transitions are told.
         commands: command lines.
         posts: URLs.
@@ -57,7 +57,7 @@ class Wishes:
 
     site: str | None
     bases: Sequence[str]
-    connect: Sequence[str]
+    network: Network
     at_least: Level
     commands: Sequence[str]
     posts: Sequence[str]
@@ -170,9 +170,8 @@ def _whom(wishes: Wishes) -> tuple[ZenohSettings, tuple[str, ...]]:
     if wishes.site is None:
         if not wishes.bases:
             raise SettingsError("nobody to follow: give a SITE or --base")
-        endpoints = tuple(wishes.connect) or (DEFAULT_ENDPOINT,)
-        return ZenohSettings(None, "client", endpoints), tuple(wishes.bases)
-    site = connect_to(load_site(wishes.site), wishes.connect)
+        return wishes.network.settings, tuple(wishes.bases)
+    site = wishes.network.of(load_site(wishes.site))
     return site.zenoh, (site.keys.base, *wishes.bases)
 
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from rich.console import Console
 
 from rampe_guard.collision import load_arm
 from rampe_guard.errors import SettingsError
-from rampe_guard.runtime.connecting import connect_to
+from rampe_guard.runtime.connecting import Network
 from rampe_guard.runtime.stopping import StopFlag
 from rampe_guard.runtime.zenoh_io import Bus
 from rampe_guard.settings import load_site
@@ -17,7 +15,7 @@ from rampe_guard.view.watch import watch
 
 
 def watch_one(
-    site_path: str, endpoints: Sequence[str], console: Console, stop: StopFlag, *, bell: bool
+    site_path: str, network: Network, console: Console, stop: StopFlag, *, bell: bool
 ) -> int:
     """Show a machine until told to stop; waits for a router if there is none.
 
@@ -26,7 +24,7 @@ def watch_one(
     """
     if bell and not console.is_terminal:
         raise SettingsError("--bell rings a terminal's bell, and the output is no terminal")
-    site = connect_to(load_site(site_path), endpoints)
+    site = network.of(load_site(site_path))
     arm = stop.unless_stopped(lambda: load_arm(site.arm))
     if arm is None:
         return 0

@@ -2,8 +2,8 @@
 
 Attachments are named by their places below the folder that holds all of them, so that the
 relative paths in them stay true wherever they are put. Absolute paths are noted, and written
-anew in the copy. Zenoh's own file is left out, an empty one stands for it: it may hold secrets,
-and no replay needs it.
+anew in the copy. Zenoh's own file, certificates and keys are left out, empty ones stand for them:
+they may hold secrets, and no replay needs them.
 """
 
 from __future__ import annotations
@@ -111,8 +111,8 @@ def _places(site: Site) -> Iterator[tuple[Path, str | None]]:
     yield _absolute(site.path), site.path
     yield _absolute(site.scene.path), site.scene.path
     yield _absolute(site.arm.urdf), site.arm.urdf
-    if site.zenoh.config is not None:
-        yield _absolute(site.zenoh.config), None
+    for _, file in _of_the_network(site):
+        yield _absolute(file), None
     for item in site.scene.objects:
         if isinstance(item, Mesh):
             yield _absolute(item.file), item.file
@@ -125,8 +125,11 @@ def _written(site: Site) -> Iterator[tuple[str, Path]]:
     document = parse(read_bytes(site.path, "site file"), site.path).data
     yield document["arm"]["urdf"], _absolute(site.arm.urdf)
     yield document["scene"], _absolute(site.scene.path)
-    if site.zenoh.config is not None:
-        yield document["zenoh"]["config"], _absolute(site.zenoh.config)
+    for path, file in _of_the_network(site):
+        written = document["zenoh"]
+        for key in path:
+            written = written[key]
+        yield written, _absolute(file)
     scene = parse(read_bytes(site.scene.path, "scene file"), site.scene.path).data
     files = {item["name"]: item["file"] for item in scene["objects"] if "file" in item}
     for item in site.scene.objects:
@@ -134,6 +137,16 @@ def _written(site: Site) -> Iterator[tuple[str, Path]]:
             yield files[item.name], _absolute(item.file)
     for reference, place, _ in _urdf_meshes(site):
         yield reference, place
+
+
+def _of_the_network(site: Site) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Where each file stands below ``zenoh``, and the file: what may hold secrets."""
+    if site.zenoh.config is not None:
+        yield ("config",), site.zenoh.config
+    if (tls := site.zenoh.tls) is not None:
+        for name in ("root_ca", "certificate", "key"):
+            if (file := getattr(tls, name)) is not None:
+                yield ("tls", name), file
 
 
 def _urdf_meshes(site: Site) -> list[tuple[str, Path, Path]]:

@@ -31,7 +31,7 @@ from rampe_guard.folders import Folders
 from rampe_guard.settings.check import PUBLISHED, check
 from rampe_guard.settings.explain import validate
 from rampe_guard.settings.model import MAX_NAME, Name
-from rampe_guard.settings.problems import Problems, show
+from rampe_guard.settings.problems import KeyPath, Problems, show
 from rampe_guard.settings.scene import existing_file, load_scene, parse_scene, pose_matrix
 from rampe_guard.settings.site_model import (
     DEFAULT_ENDPOINT,
@@ -41,8 +41,18 @@ from rampe_guard.settings.site_model import (
     MemoryModel,
     SelfCollisionModel,
     SiteModel,
+    ZenohModel,
 )
 from rampe_guard.settings.source import Document, parse, read_bytes
+
+
+@dataclass(frozen=True, slots=True)
+class TlsFiles:
+    """Paths of PEM files; certificate and key are both there, or neither."""
+
+    root_ca: str
+    certificate: str | None = None
+    key: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,11 +63,15 @@ class ZenohSettings:
         config: path of a Zenoh file, which then alone configures the session, or None.
         mode: "client" or "peer"; holds only without ``config``.
         connect: endpoints; holds only without ``config``.
+        tls: certificates for tls/ and quic/ endpoints; holds only without ``config``.
+        plain_network: messages without certificates may leave the machine.
     """
 
     config: str | None
     mode: Literal["client", "peer"]
     connect: tuple[str, ...]
+    tls: TlsFiles | None = None
+    plain_network: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +129,14 @@ class MemorySettings:
 
 
 @dataclass(frozen=True, slots=True)
+class MetricsSettings:
+    """Where Prometheus finds the guard: a host that we listen on, and a TCP port."""
+
+    host: str
+    port: int
+
+
+@dataclass(frozen=True, slots=True)
 class Site:
     """A machine at a site.
 
@@ -136,6 +158,7 @@ class Site:
         memory: how it is kept.
         self_collision: whether the arm is swept against itself.
         folders: where its files may lie; None for one that was not read from a file.
+        metrics: where metrics are served, None if they are not.
     """
 
     name: str
@@ -155,6 +178,7 @@ class Site:
     memory: MemorySettings = MemorySettings()
     self_collision: SelfCollision = field(default_factory=SelfCollision)
     folders: Folders | None = None
+    metrics: MetricsSettings | None = None
 
     @property
     def actuator_names(self) -> tuple[str, ...]:
@@ -182,12 +206,7 @@ def load_site(path: str | Path, *, within: str | Path | None = None) -> Site:
     check(model, problems)
     arm = model.arm
     urdf = existing_file(problems, ("arm", "urdf"), directory, arm.urdf, "URDF file", folders)
-    zenoh_config = None
-    if model.zenoh.config is not None:
-        where = ("zenoh", "config")
-        file = model.zenoh.config
-        what = "Zenoh configuration file"
-        zenoh_config = existing_file(problems, where, directory, file, what, folders)
+    zenoh = _zenoh(model.zenoh, directory, folders, problems)
     names = tuple(a.name for a in arm.actuators)
     keys = Keys(**model.keys.model_dump(), joystick_alive=model.inputs.joystick.alive_key)
     scene = Scene(())
@@ -203,7 +222,7 @@ def load_site(path: str | Path, *, within: str | Path | None = None) -> Site:
     return Site(
         name=model.site,
         machine=model.machine,
-        zenoh=_zenoh(model, zenoh_config),
+        zenoh=zenoh,
         keys=keys,
         format=model.format,
         arm=_arm(model, urdf or "", folders),
@@ -216,6 +235,7 @@ def load_site(path: str | Path, *, within: str | Path | None = None) -> Site:
         package_dirs=tuple(os.path.normpath(directory / d) for d in arm.package_dirs),
         operator=model.operator,
         memory=memory,
+        metrics=None if model.metrics is None else MetricsSettings(**model.metrics.model_dump()),
         self_collision=_self_collision(model.self_collision),
         folders=folders,
     )
@@ -291,11 +311,25 @@ def _self_collision(model: SelfCollisionModel) -> SelfCollision:
     return SelfCollision(model.enabled, model.margin_m, pairs)
 
 
-def _zenoh(model: SiteModel, config: str | None) -> ZenohSettings:
-    connect = model.zenoh.connect
+def _zenoh(
+    model: ZenohModel, directory: Path, folders: Folders, problems: Problems
+) -> ZenohSettings:
+    def existing(where: KeyPath, file: str | None, what: str) -> str | None:
+        if file is None:
+            return None
+        return existing_file(problems, ("zenoh", *where), directory, file, what, folders)
+
+    config = existing(("config",), model.config, "Zenoh configuration file")
+    tls = None
+    if model.tls is not None:
+        root = existing(("tls", "root_ca"), model.tls.root_ca, "certificate (PEM)")
+        certificate = existing(("tls", "certificate"), model.tls.certificate, "certificate (PEM)")
+        key = existing(("tls", "key"), model.tls.key, "private key (PEM)")
+        tls = TlsFiles(root or "", certificate, key)
+    connect = model.connect
     if connect is None:
         connect = () if config else (DEFAULT_ENDPOINT,)
-    return ZenohSettings(config, model.zenoh.mode, connect)
+    return ZenohSettings(config, model.mode, connect, tls, model.plain_network is not None)
 
 
 def _arm(model: SiteModel, urdf: str, folders: Folders) -> ArmDescription:

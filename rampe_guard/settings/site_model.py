@@ -26,6 +26,19 @@ DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 Endpoint = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]*/\S+$", max_length=1024)]
 
 
+class TlsModel(Model):
+    """Certificates (PEM files, relative to this one) for tls/ and quic/ endpoints."""
+
+    root_ca: Text = Field(description="The certificate authority of the site's routers.")
+    certificate: Text | None = Field(
+        default=None, description="The certificate that says who we are, for routers that ask."
+    )
+    key: Text | None = Field(
+        default=None,
+        description="The private key of the certificate, which only its owner may read.",
+    )
+
+
 class ZenohModel(Model):
     """How the daemon joins the Zenoh network."""
 
@@ -39,6 +52,15 @@ class ZenohModel(Model):
         default=None,
         description=f"The endpoints to connect to, {DEFAULT_ENDPOINT} if left out; with a config "
         "file: the file's own.",
+    )
+    tls: TlsModel | None = Field(
+        default=None, description="The certificates, if an endpoint is tls/ or quic/."
+    )
+    plain_network: (
+        Literal["i accept that anyone on this network can read and forge messages"] | None
+    ) = Field(
+        default=None,
+        description="This very sentence, if messages without certificates may leave the machine.",
     )
 
 
@@ -191,6 +213,19 @@ class MemoryModel(Model):
     )
 
 
+class MetricsModel(Model):
+    """Where Prometheus finds the guard."""
+
+    port: Annotated[int, Field(ge=1, le=65535)] = Field(
+        description="The TCP port on which /metrics is served."
+    )
+    host: Text = Field(
+        default="127.0.0.1",
+        description="The address to listen on; another than this computer's own must be given "
+        "in words, since whoever reaches it can read the metrics.",
+    )
+
+
 class FilesModel(Model):
     """Which files may be read beside those in the folder of the site file."""
 
@@ -233,6 +268,9 @@ class SiteModel(Model):
     alerts: AlertsModel = Field(default=AlertsModel(), description="The alarm logic.")
     memory: MemoryModel = Field(
         default=MemoryModel(), description="The memory of what was learned."
+    )
+    metrics: MetricsModel | None = Field(
+        default=None, description="The metrics for Prometheus; left out, none are served."
     )
     log: LogModel | None = Field(
         default=None, description="The columns of this machine's CSV logs."

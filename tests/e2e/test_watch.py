@@ -28,6 +28,7 @@ from rich.console import Console
 from rampe_guard.client.items import Protection, ProtectionLost
 from rampe_guard.errors import SettingsError
 from rampe_guard.programs.control_room import watch_many
+from rampe_guard.runtime.connecting import Network
 from rampe_guard.runtime.stopping import StopFlag
 from rampe_guard.settings import ZenohSettings
 from rampe_guard.view.links import Link
@@ -224,7 +225,7 @@ def test_what_cannot_be_watched_is_refused(
 ) -> None:
     console = Console(file=io.StringIO())
     with pytest.raises(SettingsError, match=re.escape(reason)):
-        watch_many((), bases, (), console, StopFlag(), bell=bell, as_json=False)
+        watch_many((), bases, Network(), console, StopFlag(), bell=bell, as_json=False)
 
 
 def test_a_network_that_is_not_there_reads_as_no_protection_and_is_told_once() -> None:

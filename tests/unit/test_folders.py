@@ -48,9 +48,9 @@ def site(folder: Path, urdf: str = "arm.urdf", scene: str = "scene.yaml", more: 
     return load_site(folder / "site.yaml")
 
 
-def refusal(folder: Path, *args: str, more: str = "") -> str:
+def refusal(folder: Path, urdf: str = "arm.urdf", scene: str = "scene.yaml", more: str = "") -> str:
     with pytest.raises(SettingsError) as caught:
-        site(folder, *args, more=more)
+        site(folder, urdf, scene, more)
     return str(caught.value)
 
 

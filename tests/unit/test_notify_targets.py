@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import socket
+import threading
 import time
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from rampe_guard.notify.sound import BELL, Sound
 from rampe_guard.notify.target import NotHeardError
 from rampe_guard.notify.tones import WARNING
 from rampe_guard.programs.notifying import Wishes, notify
+from rampe_guard.runtime.connecting import Network
 from rampe_guard.runtime.stopping import StopFlag
 from tests.support.processes import until
 
@@ -71,6 +73,30 @@ def test_a_post_that_nobody_answers_says_so_without_its_secret() -> None:
     assert "1234" not in str(told.value)
     with pytest.raises(NotHeardError, match="refused"):
         Post(f"http://127.0.0.1:{port}/", 0.5).tell(NOTICE)
+
+
+@pytest.mark.parametrize("path", ["hush?hush", "hu sh/hush"])
+def test_credentials_in_a_url_are_told_to_nobody_but_the_server(path: str) -> None:
+    with pytest.raises(NotHeardError) as told:
+        Post(f"http://user:hush@127.0.0.1:1/{path}", 0.5).tell(NOTICE)
+    assert "hush" not in str(told.value)
+    with pytest.raises(SettingsError, match="is no URL") as refused:
+        Post("http://user:hush@x:99999/?hush", 0.5)
+    assert "hush" not in str(refused.value)
+
+
+def test_credentials_in_a_url_are_sent_as_they_should_be() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        post = Post(f"http://user:p%40ss@127.0.0.1:{server.getsockname()[1]}/x", 5.0)
+        teller = threading.Thread(target=post.tell, args=(NOTICE,))
+        teller.start()
+        peer, _ = server.accept()
+        with peer:
+            heard = peer.recv(65536)
+            peer.sendall(b"HTTP/1.1 204 No Content\r\n\r\n")
+        teller.join(5.0)
+    assert b"\r\nAuthorization: Basic dXNlcjpwQHNz\r\n" in heard  # user:p@ss
+    assert heard.startswith(b"POST /x HTTP/1.1\r\n")
 
 
 def test_a_fault_of_a_target_is_said_and_tried_again() -> None:
@@ -136,7 +162,7 @@ def test_a_player_that_fails_is_said() -> None:
     ],
 )
 def test_wishes_that_cannot_be_are_refused(wish: dict[str, list[str]], says: str) -> None:
-    nothing = Wishes(None, (), (), Level.WARNING, (), (), None, 1.0, 60.0)
+    nothing = Wishes(None, (), Network(), Level.WARNING, (), (), None, 1.0, 60.0)
     fields = {name: getattr(nothing, name) for name in Wishes.__slots__} | wish
     with pytest.raises(SettingsError, match=says):
         notify(Wishes(**fields), StopFlag())

@@ -1,0 +1,69 @@
+"""Which Zenoh endpoints stay on this machine, which are proven by certificates, and which neither.
+
+An endpoint is ``PROTOCOL/ADDRESS[?METADATA][#CONFIGURATION]``. Its ends may hold secrets, such as
+a private key, so no message shows more of it than `shown`.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import re
+from typing import Final
+
+PLAIN_NETWORK: Final = "i accept that anyone on this network can read and forge messages"
+"""What a site file has to say before plain messages leave the machine."""
+PROVEN: Final = ("tls", "quic")
+"""Protocols whose far end shows a certificate."""
+LOCAL: Final = ("unixsock-stream", "unixpipe")
+"""Protocols that cannot leave the machine."""
+
+_UNVERIFIED = re.compile(r"[#;]verify_name_on_connect=(?!true(?:;|$))")
+_USER = re.compile(r"(?<=/)[^/@]*@")
+
+
+def shown(endpoint: str) -> str:
+    """An endpoint without what may be secret in it."""
+    bare = re.split("[?#]", endpoint, maxsplit=1)
+    return _USER.sub("…@", bare[0]) + ("…" if len(bare) > 1 else "")
+
+
+def redacted(text: str, endpoints: tuple[str, ...]) -> str:
+    """A message of somebody else's, with every endpoint in it as `shown`."""
+    for endpoint in sorted(endpoints, key=len, reverse=True):
+        text = text.replace(endpoint, shown(endpoint))
+    return text
+
+
+def protocol(endpoint: str) -> str:
+    """What is spoken there."""
+    return endpoint.partition("/")[0]
+
+
+def stays_here(endpoint: str) -> bool:
+    """Whether it is on this machine for certain. Names other than localhost may be anywhere."""
+    if protocol(endpoint) in LOCAL:
+        return True
+    address = re.split("[?#]", endpoint.partition("/")[2], maxsplit=1)[0]
+    host = address.rpartition(":")[0]
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host.removeprefix("[").removesuffix("]")).is_loopback
+    except ValueError:
+        return False
+
+
+def exposed(endpoint: str, *, verifies_names: bool = True) -> str | None:
+    """Why messages to this endpoint could be read or forged on their way; None if they cannot.
+
+    Args:
+        endpoint: that is connected to.
+        verifies_names: whether the name in the certificate must be that of the endpoint.
+    """
+    if stays_here(endpoint):
+        return None
+    if protocol(endpoint) not in PROVEN:
+        return f"{shown(endpoint)} is plain, and not on this machine"
+    if not verifies_names or _UNVERIFIED.search(endpoint):
+        return f"{shown(endpoint)} may show anybody's certificate (verify_name_on_connect: false)"
+    return None
