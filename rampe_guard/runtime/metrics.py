@@ -109,7 +109,7 @@ def _status(beat: wire.Heartbeat, age_s: float) -> Iterator[Metric]:
     old = age_s > OLD_S
     status = "not_monitoring" if old else beat.status
     codes = {reason.code for reason in beat.reasons} | ({NO_HEARTBEAT} if old else set())
-    info = InfoMetricFamily(_name("guard"), "Whose guard this is, and what it works with.")
+    info = InfoMetricFamily(_PREFIX, "Whose guard this is, and what it works with.")
     words = ("site", "machine", "version", "boot_id", "scene_hash", "config_hash")
     info.add_metric([], {word: str(getattr(beat, word)) for word in words})
     yield info

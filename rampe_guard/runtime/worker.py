@@ -206,13 +206,16 @@ class Worker:
             self._minders.status(text)
 
     def _answer(self, now_s: float) -> None:
+        state: bytes | None = None  # made once, however many ask
         for request in self._states.drain():
             if self._heartbeat is None:
                 request.refuse("not ready yet")
                 continue
-            snapshot = self._guard.snapshot(now_s)
-            state = self._scribe.state(self._heartbeat, snapshot, self._prediction)
-            request.reply(wire.encode(state))
+            if state is None:
+                snapshot = self._guard.snapshot(now_s)
+                told = self._scribe.state(self._heartbeat, snapshot, self._prediction)
+                state = wire.encode(told)
+            request.reply(state)
         self._orders.answer(now_s)
         self._scene.answer()
 

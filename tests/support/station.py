@@ -74,15 +74,15 @@ class Station:
 
 
 @contextlib.contextmanager
-def station(folder: Path, site_path: Path = BENCH) -> Iterator[Station]:
-    """Start all, machine at rest and both streams on; end all."""
+def station(folder: Path, site_path: Path = BENCH, *more: str) -> Iterator[Station]:
+    """Start all, machine at rest and both streams on; end all. ``more`` are options of ``run``."""
     site = load_site(site_path)
     endpoint = processes.free_endpoint()
     with contextlib.ExitStack() as stack:
         router = stack.enter_context(processes.router(folder, endpoint))
         ears = stack.enter_context(Ears(endpoint, site.keys.base))
         rig = stack.enter_context(Rig(endpoint, site, REST))
-        guard = stack.enter_context(processes.guard(folder, site_path, endpoint))
+        guard = stack.enter_context(processes.guard(folder, site_path, endpoint, *more))
         made = Station(site, site_path, endpoint, router, guard, rig, ears)
         ears.wait("heartbeat", lambda b: b["status"] == "ok", 20.0, 0.0)
         yield made
