@@ -47,6 +47,8 @@ def decode(payload: bytes, kind: type[T], *, limit: int = MAX_OWN_BYTES) -> T:
     if len(payload) > limit:
         raise MessageError("too_large", f"{len(payload)} bytes, at most {limit} are taken")
     try:
+        if not payload.isascii():  # msgspec does not look into the text of fields it ignores
+            payload.decode()
         return _decoder(kind).decode(payload)
     except msgspec.ValidationError as error:
         if "out of range" in str(error):

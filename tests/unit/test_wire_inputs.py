@@ -42,6 +42,7 @@ def test_joystick_axis_a_little_too_far_is_clipped() -> None:
         (b"[0, 0]", "bad_json"),
         (b'{"axes": [0, "0"]}', "bad_json"),
         (b'{"axes": [0, true]}', "bad_json"),
+        (b'{"axes": [0, 0], "st\xc0\x80mp": 1}', "bad_json"),
         (b'{"axes": [0, null]}', "bad_json"),
         (b'{"stamp": 1}', "bad_json"),
         (b'{"axes": [0, 0], "stamp": "now"}', "bad_json"),
