@@ -14,8 +14,8 @@ from typing import Any, Final
 from rampe_guard.errors import SettingsError
 from rampe_guard.settings.access import AccessModel, GrantModel, MachineModel, read_access
 
-MAX_MESSAGE_BYTES: Final = 64 * 1024
-"""As the guard itself refuses more (`wire.MAX_PAYLOAD_BYTES`)."""
+MAX_MESSAGE_BYTES: Final = 128 * 1024
+"""Twice what the guard takes: the router drops without a word, the guard refuses and counts."""
 MAX_SCENE_BYTES: Final = 8 * 1024 * 1024
 MAX_REPLY_BYTES: Final = 16 * 1024 * 1024
 PUBLISHED: Final = ("alert", "prediction", "heartbeat")

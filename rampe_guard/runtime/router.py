@@ -1,22 +1,36 @@
-"""A Zenoh router in a process of its own: ``python -m rampe_guard.runtime.router ENDPOINT…``.
+"""A Zenoh router in a process of its own.
 
-For the demo and for tests; a site runs the official router (see deploy/).
+::
+
+    python -m rampe_guard.runtime.router ENDPOINT...
+    python -m rampe_guard.runtime.router --config FILE.json5
+
+For the demo and for tests; a site runs the official router (see deploy/), which takes the same
+file. With RUST_LOG set, Zenoh's own log goes to stdout, as the official router's does.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 
 from rampe_guard.errors import RampeGuardError
 from rampe_guard.runtime.stopping import StopFlag
-from rampe_guard.runtime.zenoh_io import router
+from rampe_guard.runtime.zenoh_io import log_as_told, router
 
 
 def main() -> int:
     """Route until told to stop."""
+    parser = argparse.ArgumentParser(prog="router", description="A Zenoh router.")
+    parser.add_argument("endpoints", nargs="*", help="to listen on, such as tcp/127.0.0.1:7447")
+    parser.add_argument("--config", help="its configuration (json5) instead")
+    args = parser.parse_args()
+    if bool(args.endpoints) is (args.config is not None):
+        parser.error("give endpoints, or --config FILE")
     stop = StopFlag.on_signals()
+    log_as_told()
     try:
-        with router(sys.argv[1:]):
+        with router(args.endpoints, args.config):
             print("ready", flush=True)  # noqa: T201 - whoever started it waits for this line
             while not stop.wait(1.0):
                 pass
