@@ -30,6 +30,8 @@ _MOST_BYTES: Final = 1 << 16
 _MOST: Final = 20
 """Alerts that are remembered; the newest ones."""
 _END_S: Final = 0.3
+_TOLD: Final = "canary failed"
+"""That is told by the supervisor anyway."""
 _UNSEEN: Final = ("unacked", "rtn_unacked")
 _COMPUTER: Final = Path("/proc/sys/kernel/random/boot_id")
 
@@ -97,8 +99,8 @@ class RunMarker:
             self._new.pop(alert.alert_id, None)
         elif alert.source == "contact":
             self._new[alert.alert_id] = f"{alert.link or 'arm'} at {alert.zone}"
-        elif alert.source == "system" and alert.level == "warning":
-            self._new[alert.alert_id] = alert.text
+        elif alert.source == "system" and alert.level == "warning" and _TOLD not in alert.text:
+            self._new[alert.alert_id] = "not monitoring"
         if self._unseen() != before:
             self._save()
 
@@ -122,11 +124,11 @@ class RunMarker:
         try:
             self._file = ModelFile(model_folder(self._site) / NAME, _MOST_BYTES)
             self._file.lock()
-            self._recall(self._file.read())
         except ModelFileError as error:
             self._stuck = str(error)
             self._say.warn("run", f"alerts that nobody has seen are not kept: {error}")
             return self
+        self._recall(self._file)
         self._saver = Saver(self._file, self._now)
         self._save()
         return self
@@ -151,12 +153,12 @@ class RunMarker:
                 self._say.warn("run", f"the next guard will take this run for cut off: {stuck}")
         file.release()
 
-    def _recall(self, content: bytes | None) -> None:
-        if content is None:
-            return
+    def _recall(self, file: ModelFile) -> None:
         try:
+            if (content := file.read()) is None:
+                return
             run = msgspec.json.decode(content, type=Run)
-        except msgspec.DecodeError as error:
+        except (ModelFileError, msgspec.DecodeError, UnicodeDecodeError) as error:
             self.cause = "an end of which nothing is known"
             self._say.warn("run", f"{NAME} of the run before cannot be read: {error}")
             return
