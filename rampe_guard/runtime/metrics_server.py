@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, HTTPServer
-from socket import AF_INET6, socket
+from socket import AF_INET6, SHUT_RDWR, socket
 from types import TracebackType
 from typing import Any, Final, Self
 
@@ -76,16 +76,16 @@ class _Server(HTTPServer):
     def process_request(self, request: socket | tuple[bytes, socket], client_address: Any) -> None:
         """Serve it in a thread, if one is free."""
         time.sleep(_BREATH_S)
-        if not self._seats.acquire(blocking=False):
+        if isinstance(request, tuple) or not self._seats.acquire(blocking=False):
             self.shutdown_request(request)
             return
         threading.Thread(
             target=self._serve, args=(request, client_address), name="metrics", daemon=True
         ).start()
 
-    def _serve(self, request: socket | tuple[bytes, socket], client_address: Any) -> None:
+    def _serve(self, request: socket, client_address: Any) -> None:
         # a time-out of its own for the whole: a byte every second is slow, too
-        end = threading.Timer(2.0 * PATIENCE_S, self.shutdown_request, [request])
+        end = threading.Timer(2.0 * PATIENCE_S, _cut, [request])
         end.daemon = True
         end.start()
         try:
@@ -95,6 +95,12 @@ class _Server(HTTPServer):
             end.cancel()
             self.shutdown_request(request)
             self._seats.release()
+
+
+def _cut(request: socket) -> None:
+    """Closing does not end a read that another thread is in; this does."""
+    with contextlib.suppress(OSError):
+        request.shutdown(SHUT_RDWR)
 
 
 class MetricsServer:
