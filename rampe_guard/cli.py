@@ -142,12 +142,16 @@ def _dashboard(args: argparse.Namespace) -> int:
     from rampe_guard.runtime.stopping import StopFlag
 
     stop = StopFlag.on_signals()  # before the imports, which take a while
-    from rampe_guard.programs.dashboarding import dashboard_sites
+    from rampe_guard.programs.dashboarding import Place, dashboard_sites
+    from rampe_guard.runtime.log_lines import configure
+
+    configure("text")
 
     def say(text: str) -> None:
         print(text, flush=True)
 
-    return dashboard_sites(args.site, args.connect, args.host, args.port, say, stop)
+    place = Place(args.host, args.port, args.token_file, tuple(args.names))
+    return dashboard_sites(args.site, args.connect, place, say, stop)
 
 
 def _notify(args: argparse.Namespace) -> int:

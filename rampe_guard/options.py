@@ -149,8 +149,24 @@ def add_dashboard(parser: argparse.ArgumentParser) -> None:
     """Machines, and where the page is served."""
     parser.add_argument("site", nargs="+", help="site files (YAML), one per machine")
     add_connect(parser)
-    parser.add_argument("--host", default="127.0.0.1", help="to listen on (default 127.0.0.1)")
+    parser.add_argument(
+        "--host",
+        default="127.0.0.1",
+        help="to listen on (default 127.0.0.1); beyond loopback pages need a token",
+    )
     parser.add_argument("--port", type=port, default=8080, help="0: any free (default 8080)")
+    parser.add_argument(
+        "--token-file",
+        metavar="FILE",
+        help="holds the token that pages need, mode 0600; without it one is made and printed",
+    )
+    parser.add_argument(
+        "--name",
+        action="append",
+        default=[],
+        dest="names",
+        help="further host name by which browsers call it, such as that of a proxy before it",
+    )
 
 
 def add_record(parser: argparse.ArgumentParser) -> None:

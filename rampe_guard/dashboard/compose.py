@@ -81,7 +81,8 @@ def _attention(alert: Alert) -> bool:
 def _banner(sight: Sight) -> Banner:
     guard = sight.guard
     protection = Protection.UNAVAILABLE if sight.trouble else guard.protection
-    why = sight.trouble or "; ".join(guard.reasons)
+    other = (sight.other_scene,) if sight.other_scene else ()
+    why = sight.trouble or "; ".join((*other, *guard.reasons))
     if protection is Protection.MACHINE_OFF:
         return Banner(Tone.OFF, Tone.OFF.look.word, "not monitored", detail=WORK_ALONE)
     if not protection.guarded:
@@ -91,7 +92,8 @@ def _banner(sight: Sight) -> Banner:
         seen = any(a.zone is None and a.state == "acked" for a in guard.alerts)
         word = Tone.LOST.look.word
         return Banner(Tone.LOST, word, text, detail=WORK_ALONE, flash=not seen)
-    degraded = f"degraded: {why}" if protection is Protection.DEGRADED else ""
+    worse = protection is Protection.DEGRADED or other
+    degraded = f"degraded: {why}" if worse else ""
     if not guard.active:
         shelved = _count(len(guard.shelved), "alert shelved", "alerts shelved")
         if degraded:

@@ -20,9 +20,11 @@ from rampe_guard.client import fleet as fleets
 from rampe_guard.client.fleet import Fleet, Told
 from rampe_guard.client.items import Item
 from rampe_guard.client.order import Order, give
+from rampe_guard.core.scene import Scene
 from rampe_guard.core.types import ActuatorSample
 from rampe_guard.core.velocity import VelocityEstimator
 from rampe_guard.dashboard.happenings import Leads, with_items
+from rampe_guard.dashboard.scene_follow import SceneFollower
 from rampe_guard.dashboard.sight import Sight
 from rampe_guard.errors import ConnectionFailedError, MessageError
 from rampe_guard.runtime.batch import pose_of
@@ -61,6 +63,7 @@ class Feed:
 
     Attributes:
         sight: what is known, as of the last `poll`.
+        undrawable: why the newest scene cannot be drawn; empty if it can.
     """
 
     def __init__(self, site: Site, stop: StopFlag) -> None:
@@ -78,6 +81,8 @@ class Feed:
         self._line: _Line | None = None
         self._trouble = self.sight.trouble
         self._answers: deque[tuple[float, wire.State]] = deque(maxlen=_KEPT_ANSWERS)
+        self._scene = SceneFollower(site)
+        self.undrawable = ""
         self._thread = threading.Thread(target=self._work, name=f"feed {self._base}", daemon=True)
 
     def start(self) -> None:
@@ -87,7 +92,8 @@ class Feed:
     def poll(self, now_s: float) -> Sight:
         """Take all that arrived; returns the new `sight`."""
         items: list[Item] = []
-        sight = replace(self.sight, now_s=now_s, trouble=self._trouble)
+        other_scene = self._scene.trouble or self.undrawable
+        sight = replace(self.sight, now_s=now_s, trouble=self._trouble, other_scene=other_scene)
         line = self._line
         if line is not None:
             sight = self._take_inputs(line, sight)
@@ -103,6 +109,11 @@ class Feed:
             sight, guard=guard, prediction=prediction, events=events, leads=self._leads.lines
         )
         return self.sight
+
+    @property
+    def scene(self) -> Scene:
+        """The newest that is known of the guard's."""
+        return self._scene.scene
 
     def acknowledge(self, alert_id: str, who: str) -> None:
         """Tell the guard that someone has seen an alert.
@@ -141,8 +152,13 @@ class Feed:
         self._line = self._subscribe(bus)
         while not self._stop.wait(_ASK_S):
             self._trouble = "" if bus.connected else "no Zenoh router"
-            if self._fleet.machines[self._base].behind:
+            guard = self._fleet.machines[self._base]
+            if guard.behind:
                 self._catch_up(bus)
+            beat = guard.heartbeat
+            if beat is not None and self._scene.follow(bus, beat.scene_hash):
+                self.undrawable = ""
+                self._line = replace(self._line, objects=self._objects(bus))
 
     def _cannot(self, why: str) -> None:
         self._trouble = why
@@ -157,10 +173,18 @@ class Feed:
             predictions=bus.inbox(f"{base}/prediction", _CAPACITY),
             beats=bus.inbox(f"{base}/heartbeat", _CAPACITY),
             token=bus.liveness(f"{base}/alive"),
-            objects=tuple(
-                (item.name, bus.inbox(item.key or "", _CAPACITY))
-                for item in self._site.scene.moving
-            ),
+            objects=self._objects(bus),
+        )
+
+    def _objects(self, bus: Bus) -> tuple[tuple[str, Inbox], ...]:
+        """The poses of all that moves; those that are heard already stay as they are."""
+        heard = {} if self._line is None else dict(self._line.objects)
+        wanted = {item.name: item.key or "" for item in self._scene.scene.moving}
+        for name in heard.keys() - wanted.keys():
+            heard[name].close()
+        return tuple(
+            (name, heard[name] if name in heard else bus.inbox(key, _CAPACITY))
+            for name, key in wanted.items()
         )
 
     def _catch_up(self, bus: Bus) -> None:

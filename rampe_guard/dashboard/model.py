@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rampe_guard.collision import Arm, load_arm
 from rampe_guard.core.forecast import Forecaster
 from rampe_guard.core.kinematics import ForwardKinematics
-from rampe_guard.core.scene import ActuatorLimit
+from rampe_guard.core.scene import ActuatorLimit, Scene
 from rampe_guard.core.types import FloatArray
 from rampe_guard.dashboard.solids import Solid, Triangles, solids
 from rampe_guard.settings import Site
@@ -78,6 +78,20 @@ def load_model(site: Site) -> Model:
         ),
         middle=middle,
         reach_m=reach_m,
+    )
+
+
+def in_scene(model: Model, scene: Scene) -> Model:
+    """The same machine among other objects.
+
+    Raises:
+        GeometryError: a mesh cannot be used.
+    """
+    return replace(
+        model,
+        site=replace(model.site, scene=scene),
+        solids=solids(scene.objects, model.reach_m),
+        limits=tuple(o for o in scene.objects if isinstance(o, ActuatorLimit)),
     )
 
 

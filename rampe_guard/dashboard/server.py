@@ -13,15 +13,20 @@ import threading
 import time
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 
 import viser
 
+from rampe_guard.core.scene import Scene
+from rampe_guard.dashboard.access import Access
 from rampe_guard.dashboard.compose import compose
 from rampe_guard.dashboard.feed import Feed
-from rampe_guard.dashboard.model import Model
+from rampe_guard.dashboard.gate import Gate
+from rampe_guard.dashboard.model import Model, in_scene
 from rampe_guard.dashboard.panel import Panel
 from rampe_guard.dashboard.stage import Stage
-from rampe_guard.errors import ConnectionFailedError
+from rampe_guard.errors import ConnectionFailedError, GeometryError
+from rampe_guard.runtime.say import Sayer
 from rampe_guard.runtime.stopping import StopFlag
 
 FRAME_S = 1.0 / 30.0
@@ -51,7 +56,7 @@ class Page:
         self._client = client
         self._models = models
         self._stage: Stage | None = None
-        self._staged = 0
+        self._staged: Model | None = None
         self.chosen = 0
         names = [f"{m.site.machine} · {m.site.name}" for m in models]
         self._panel = Panel(client, names, self._choose, lambda: feeds[self.chosen])
@@ -59,12 +64,13 @@ class Page:
     def show(self, feeds: Sequence[Feed]) -> None:
         """Put the newest picture of the chosen machine onto it."""
         chosen = self.chosen
-        picture = compose(self._models[chosen], feeds[chosen].sight)
+        model = self._models[chosen]
+        picture = compose(model, feeds[chosen].sight)
         with self._client.atomic():
-            if self._stage is None or self._staged != chosen:
+            if self._stage is None or self._staged is not model:
                 if self._stage is not None:
                     self._stage.clear()
-                self._stage, self._staged = Stage(self._client, self._models[chosen]), chosen
+                self._stage, self._staged = Stage(self._client, model), model
             self._stage.show(picture, night=self._panel.night)
             self._panel.show(picture)
 
@@ -80,22 +86,33 @@ class Dashboard:
         feeds: who follows them, in the same order.
         host: address to listen on.
         port: the same; 0 for any that is free.
+        token: that pages have to show; needed beyond loopback.
+        names: further names by which browsers may call it.
 
     Raises:
         ConnectionFailedError: the address cannot be listened on.
     """
 
     def __init__(
-        self, models: Sequence[Model], feeds: Sequence[Feed], host: str, port: int
+        self,
+        models: Sequence[Model],
+        feeds: Sequence[Feed],
+        host: str,
+        port: int,
+        token: str | None = None,
+        names: Sequence[str] = (),
     ) -> None:
-        self._models, self._feeds = models, feeds
+        self._models, self._feeds = list(models), feeds
         # a picture may be on its way to a page that has just gone: nothing to warn of
         warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
         self._lock = threading.Lock()
         self._pages: dict[int, Page] = {}
         # a health check, or whatever else speaks no websocket, is no fault of ours
         logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
-        self._server = _Server(host=host, port=_free(host, port), verbose=False)
+        port = _free(host, port)
+        self.gate = Gate(Access(host, port, token, names), Sayer("rampe_guard.dashboard"))
+        with self.gate.guarding():
+            self._server = _Server(host=host, port=port, verbose=False)
         self._server.on_client_connect(self._come)
         self._server.on_client_disconnect(self._go)
 
@@ -114,8 +131,9 @@ class Dashboard:
     def tick(self) -> None:
         """One picture for every page."""
         now_s = time.monotonic()
-        for feed in self._feeds:
+        for number, feed in enumerate(self._feeds):
             feed.poll(now_s)
+            self._change_scene(number, feed.scene)
         with self._lock:
             pages = list(self._pages.items())
         for number, page in pages:
@@ -125,6 +143,17 @@ class Dashboard:
                 # this one will say by itself that it has lost its dashboard
                 logging.getLogger(__name__).exception("page %d is given up", number)
                 self._drop(number)
+
+    def _change_scene(self, number: int, scene: Scene) -> None:
+        """Draw a machine in another scene from now on, if there is another."""
+        model = self._models[number]
+        if scene is model.site.scene:
+            return
+        try:
+            self._models[number] = in_scene(model, scene)
+        except GeometryError as error:  # what is drawn stays, and says that it is another
+            self._feeds[number].undrawable = f"the guard's scene cannot be drawn: {error}"
+            self._models[number] = replace(model, site=replace(model.site, scene=scene))
 
     def close(self) -> None:
         """Send all pages away."""

@@ -22,6 +22,7 @@ class Sight:
         guard: what its guard says, or that it says nothing.
         now_s: now [s].
         trouble: why nothing can be heard (no router, say); empty if the way is open.
+        other_scene: why the scene that is drawn is not the guard's; empty if it is.
         position: newest (n,) [unit]; None before the first.
         position_s: when it came [s].
         velocity: (n,) [unit/s].
@@ -37,6 +38,7 @@ class Sight:
     guard: MachineState
     now_s: float
     trouble: str = ""
+    other_scene: str = ""
     position: FloatArray | None = None
     position_s: float = 0.0
     velocity: FloatArray | None = None

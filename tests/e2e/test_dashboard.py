@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import json
+import http.client
 import signal
 import time
 from collections.abc import Iterator
@@ -129,6 +131,19 @@ def pressed(cab: Cab, start_s: float) -> bool:
     return False
 
 
+def test_a_scene_that_is_put_is_drawn_without_a_reload(cab: Cab) -> None:
+    page, base = cab.page, cab.station.site.keys.base
+    own = Path(cab.station.site.scene.path).read_text("utf-8")
+    fence = own.replace("slew-left", "fence").replace("above: 1.3", "above: 1.4")
+    for text, shown in ((fence, "fence: swing above +1.40 rad"), (own, "slew-left: swing above")):
+        wish = json.dumps({"scene": text, "who": "ann"}).encode()
+        assert cab.station.ears.ask(f"{base}/scene/put", wish)
+        until(lambda words=shown: words in page.text, SOON_S, f"{shown!r} on the page")
+    assert "fence" not in page.evaluate(BANNER)
+    assert Scene(page).blue.sum() > LEAST_BLUE
+    assert not page.complaints
+
+
 def test_a_guard_that_dies_is_told_and_its_successor_is_taken_up_without_a_reload(
     cab: Cab,
 ) -> None:
@@ -177,6 +192,15 @@ def test_a_page_that_lost_its_dashboard_says_so_and_finds_it_again(cab: Cab) -> 
     page.wait("!document.body.innerText.includes('lost its dashboard')", SOON_S)
     cab.monitored()
     assert page.evaluate("window.sameAsBefore === true")
+
+
+def test_a_name_that_is_not_its_own_leads_nowhere(cab: Cab) -> None:
+    """DNS rebinding: the browser believes that it talks to evil.example."""
+    for name, status in (("evil.example", 403), (f"localhost:{cab.port}", 200)):
+        connection = http.client.HTTPConnection("127.0.0.1", cab.port, timeout=SOON_S)
+        with contextlib.closing(connection):
+            connection.request("GET", "/", headers={"Host": name})
+            assert connection.getresponse().status == status
 
 
 def test_a_second_one_on_the_same_port_is_refused(cab: Cab) -> None:
