@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import http.client
+import json
 import signal
 import time
 from collections.abc import Iterator
@@ -138,7 +138,7 @@ def test_a_scene_that_is_put_is_drawn_without_a_reload(cab: Cab) -> None:
     for text, shown in ((fence, "fence: swing above +1.40 rad"), (own, "slew-left: swing above")):
         wish = json.dumps({"scene": text, "who": "ann"}).encode()
         assert cab.station.ears.ask(f"{base}/scene/put", wish)
-        until(lambda words=shown: words in page.text, SOON_S, f"{shown!r} on the page")
+        page.wait(f"document.body.innerText.includes({json.dumps(shown)})", SOON_S)
     assert "fence" not in page.evaluate(BANNER)
     assert Scene(page).blue.sum() > LEAST_BLUE
     assert not page.complaints

@@ -13,7 +13,7 @@ import pytest
 
 from rampe_guard.settings import load_site
 from tests.support import processes
-from tests.support.processes import BENCH, command, until
+from tests.support.processes import BENCH, called, until
 from tests.support.station import HANDS_OFF, Station
 
 pytestmark = pytest.mark.e2e
@@ -112,7 +112,7 @@ def test_a_guard_that_is_killed_comes_back_with_the_scene_that_was_put(
     file = tmp_path / "new.yaml"
     file.write_text(limit(1.31, "by-hand"), "utf-8")
     args = (str(live.site_path), "--connect", live.endpoint)
-    done = command("scene", "put", *args, file, "--who", "Ben")
+    done = called("scene", "put", *args, file, "--who", "Ben")
     assert done.returncode == 0, done.stderr
     assert "put by Ben" in done.stdout
     before = in_force(live)
@@ -121,11 +121,11 @@ def test_a_guard_that_is_killed_comes_back_with_the_scene_that_was_put(
     boot_id = live.ears.all()[-1].body["boot_id"]
     live.ears.wait("heartbeat", lambda b: b["boot_id"] != boot_id, 30.0, start_s)
     assert in_force(live) == before
-    shown = command("scene", "show", *args)
+    shown = called("scene", "show", *args)
     assert shown.stdout == file.read_text("utf-8")
     assert "put by Ben" in shown.stderr
     # the site's own file is the way back, and needs nothing kept
-    assert command("scene", "put", *args, OWN).returncode == 0
+    assert called("scene", "put", *args, OWN).returncode == 0
     assert in_force(live)["scene_hash"] == live.site.scene.content_hash
 
 
@@ -136,10 +136,10 @@ def test_what_was_learned_is_forgotten(live: Station) -> None:
         live.drive_to(1.0)
     live.calm()
     args = (str(live.site_path), "--connect", live.endpoint)
-    refused = command("model", "reset", *args, "--running", "--operator", "Zoe")
+    refused = called("model", "reset", *args, "--running", "--operator", "Zoe")
     assert refused.returncode == 2
     assert "'Zoe' is not at the levers" in refused.stderr
-    done = command("model", "reset", *args, "--running", "--who", WHO)
+    done = called("model", "reset", *args, "--running", "--who", WHO)
     assert done.returncode == 0, done.stderr
     assert "forgotten: operator 'operator'" in done.stdout
     assert f"forget by {WHO}" in live.guard.err
