@@ -15,8 +15,10 @@ import os
 import signal
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from rampe_guard.settings import load_site
 from tests.support import processes
@@ -59,8 +61,10 @@ class Verdict:
 class Ground:
     """Everything that runs; use `proving_ground`."""
 
-    def __init__(self, folder: Path, site_path: Path, *, rate_hz: float, seed: int) -> None:
-        self.folder, self.site_path = folder, site_path
+    def __init__(
+        self, folder: Path, site_path: Path, *, rate_hz: float, seed: int, clock: Path | None
+    ) -> None:
+        self.folder, self.site_path, self.clock = folder, site_path, clock
         self.site = load_site(site_path)
         self.endpoint = processes.free_endpoint()
         self.rate_hz, self._seed = rate_hz, seed
@@ -80,12 +84,11 @@ class Ground:
             raise
 
     def _start(self) -> None:
-        folder, site_path = self.folder, self.site_path
-        self.router = self._keep(processes.router(folder, self.endpoint))
+        self.router = self._keep(processes.router(self.folder, self.endpoint))
         self.machine = self._keep(self._new_machine())
         self.witness = self._stack.enter_context(Witness(self.endpoint, self.site.keys.base))
         self.viewer = self._keep(self._new_viewer())
-        self.guard = self._keep(processes.guard(folder, site_path, self.endpoint))
+        self.guard = self._keep(self._new_guard())
         self._worker = processes.guarding(self.guard)
 
     def _keep(self, process: Process) -> Process:
@@ -103,6 +106,18 @@ class Ground:
         more = [str(self._truth), "--rate", str(self.rate_hz), "--seed", str(self._seed)]
         process = Process(self.folder, "machine", [*words, *more], talk=True)
         process.wait_for("ready")
+        return process
+
+    def _new_guard(self) -> Process:
+        if self.clock is None:
+            return processes.guard(self.folder, self.site_path, self.endpoint)
+        words = ["-m", "tests.support.clock_guard", str(self.clock), "run", str(self.site_path)]
+        process = Process(self.folder, "guard", [*words, "--connect", self.endpoint])
+        try:
+            process.wait_for("guarding on")
+        except BaseException:
+            process.close()
+            raise
         return process
 
     def _new_viewer(self) -> Process:
@@ -140,6 +155,16 @@ class Ground:
         finally:
             self.tick()
             self._windows[-1] = (self._windows[-1][0], time.monotonic())
+
+    def ask(self, word: str, payload: bytes | None = None) -> list[dict[str, Any]]:
+        """Query the guard, and go on judging meanwhile; the answers."""
+        key = f"{self.site.keys.base}/{word}"
+        with ThreadPoolExecutor(1) as pool:
+            answers = pool.submit(self.witness.ask, key, payload)
+            while not answers.done():
+                self.tick()
+                time.sleep(TICK_S / 10)
+            return answers.result()
 
     # What is seen.
 
@@ -212,12 +237,13 @@ class Ground:
             lambda: self.pressed and self.shown() == "imminent", 20.0, "an alert at the crate"
         )
 
-    def back(self, since_s: float, within_s: float) -> float:
+    def back(self, since_s: float, within_s: float, steady_s: float = STEADY_S) -> float:
         """Wait until the guard watches again, and goes on so; how long that took [s].
 
         Args:
             since_s: when the fault was over [s].
             within_s: fail after this time [s].
+            steady_s: for how long it must go on so [s].
         """
 
         def watches() -> bool:
@@ -230,7 +256,7 @@ class Ground:
         while True:
             left_s = max(deadline_s - time.monotonic(), 0.0)
             back_s = self.wait(watches, left_s, "protection back")
-            while watches() and time.monotonic() - back_s < STEADY_S:
+            while watches() and time.monotonic() - back_s < steady_s:
                 self.pause(TICK_S)
             if watches():
                 return max(back_s - since_s, 0.0)
@@ -268,10 +294,24 @@ class Ground:
 
 @contextlib.contextmanager
 def proving_ground(
-    folder: Path, site_path: Path, *, rate_hz: float = 100.0, seed: int = 1
+    folder: Path,
+    site_path: Path,
+    *,
+    rate_hz: float = 100.0,
+    seed: int = 1,
+    clock: Path | None = None,
 ) -> Iterator[Ground]:
-    """Start all and wait until the guard watches; end all."""
-    ground = Ground(folder, site_path, rate_hz=rate_hz, seed=seed)
+    """Start all and wait until the guard watches; end all.
+
+    Args:
+        folder: for logs and all that is kept.
+        site_path: of the bench site or a copy of it.
+        rate_hz: of the machine's messages.
+        seed: of what the machine does.
+        clock: a file that says by how much the guard's wall clock is off [s]; without it the guard
+            is the shipped program.
+    """
+    ground = Ground(folder, site_path, rate_hz=rate_hz, seed=seed, clock=clock)
     try:
         ground.wait(lambda: ground.witness.status(0.0) == "ok", 30.0, "status ok")
         ground.verdict = Verdict()
