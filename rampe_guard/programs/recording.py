@@ -15,6 +15,7 @@ from rampe_guard.recording.bundle import Bundle, gather
 from rampe_guard.recording.channels import channels_of
 from rampe_guard.recording.recorded_site import absolute_words
 from rampe_guard.recording.recorder import Ended, Recorder
+from rampe_guard.recording.scene_watch import SceneWatch
 from rampe_guard.recording.series import Rotation, Series
 from rampe_guard.recording.taps import Clock, Taps
 from rampe_guard.recording.writer import FILES, METADATA, MODEL, SITUATIONS, Entry, Head
@@ -78,7 +79,9 @@ def record(wishes: Wishes, stop: StopFlag) -> str:
         return summary(Ended(0, 0, series.written_bytes), series.begun)
     with bus:
         taps = Taps(bus, channels, clock)
-        recorder = Recorder(bus, site, taps, series, say, beginning.notice)
+        beginning.scene.ask(bus)
+        another = beginning.scene.changed
+        recorder = Recorder(bus, site, taps, series, say, beginning.notice, another)
         say.info(f"recording {site.machine} at {site.name} into {wishes.out}")
         until_s = None if wishes.seconds is None else time.monotonic() + wishes.seconds
 
@@ -113,7 +116,8 @@ class _Beginning:
     """What stands at the beginning of each file; keeps an eye on what the guard really uses."""
 
     def __init__(self, site: Site, bundle: Bundle, clock: Clock, say: Sayer) -> None:
-        self._site, self._bundle, self._clock, self._say = site, bundle, clock, say
+        self._site, self._clock, self._say = site, clock, say
+        self.scene = SceneWatch(site, bundle, say)
         self._guard: dict[str, str] = {}
 
     def notice(self, entry: Entry) -> None:
@@ -124,7 +128,12 @@ class _Beginning:
             beat = wire.decode(entry.payload, wire.Heartbeat)
         except MessageError:
             return
-        if beat.boot_id == self._guard.get("boot_id"):
+        self.scene.notice(beat.scene_hash)
+        again = (beat.boot_id, beat.scene_hash) == (
+            self._guard.get("boot_id"),
+            self._guard.get("scene_hash"),
+        )
+        if again:
             return
         self._guard = {
             "boot_id": beat.boot_id,
@@ -132,22 +141,18 @@ class _Beginning:
             "config_hash": beat.config_hash,
             "scene_hash": beat.scene_hash,
         }
-        for what, theirs, ours in (
-            ("site file or URDF", beat.config_hash, self._site.content_hash),
-            ("scene", beat.scene_hash, self._site.scene.content_hash),
-        ):
-            if theirs != ours:
-                text = f"the guard works with another {what} than {self._site.path} says: what is"
-                self._say.warn(what, f"{text} attached to the recording is not what it saw")
+        if beat.config_hash != self._site.content_hash:
+            text = f"the guard works with another site file or URDF than {self._site.path}: what is"
+            self._say.warn("config", f"{text} attached to the recording is not what it saw")
 
     def head(self, number: int) -> Head:
         """The beginning of the file of this number."""
-        site = self._site
+        site, bundle = self.scene.site, self.scene.bundle
         words = {
             "format": FORMAT,
             "version": __version__,
-            "site_file": FILES + self._bundle.site,
-            "absolute": absolute_words(self._bundle),
+            "site_file": FILES + bundle.site,
+            "absolute": absolute_words(bundle),
             "site": site.name,
             "machine": site.machine,
             "operator": site.operator,
@@ -155,7 +160,7 @@ class _Beginning:
             "scene_hash": site.scene.content_hash,
             "number": str(number),
         }
-        attachments = {FILES + name: content for name, content in self._bundle.files.items()}
+        attachments = {FILES + name: content for name, content in bundle.files.items()}
         attachments |= self._learned()
         guard = {GUARD: self._guard} if self._guard else {}
         return Head({METADATA: words, **guard}, attachments, self._clock.now_ns())

@@ -40,8 +40,12 @@ class Bundle:
     absolute: Mapping[str, str]
 
 
-def gather(site: Site) -> Bundle:
+def gather(site: Site, scene_text: str | None = None) -> Bundle:
     """Read all files of a site: its own, scene, URDF, and the meshes of both.
+
+    Args:
+        site: with the scene that is meant.
+        scene_text: its text, if that is not what stands in the scene file.
 
     Raises:
         SettingsError: one cannot be read.
@@ -56,9 +60,12 @@ def gather(site: Site) -> Bundle:
         else read_bytes(source, "file", limit=MAX_MESH_BYTES)
         for place, source in places.items()
     }
+    text = read_bytes(site.scene.path, "scene file")
+    if scene_text is not None:
+        text = files[names[_absolute(site.scene.path)]] = scene_text.encode()
     absolute = {
         written: names[place]
-        for written, place in _written(site)
+        for written, place in _written(site, text)
         if Path(written.removeprefix("file://")).is_absolute()
     }
     return Bundle(names[_absolute(site.path)], files, absolute)
@@ -120,7 +127,7 @@ def _places(site: Site) -> Iterator[tuple[Path, str | None]]:
         yield place, str(found)
 
 
-def _written(site: Site) -> Iterator[tuple[str, Path]]:
+def _written(site: Site, scene_text: bytes) -> Iterator[tuple[str, Path]]:
     """References as they stand in the files, and which place each means."""
     document = parse(read_bytes(site.path, "site file"), site.path).data
     yield document["arm"]["urdf"], _absolute(site.arm.urdf)
@@ -130,7 +137,7 @@ def _written(site: Site) -> Iterator[tuple[str, Path]]:
         for key in path:
             written = written[key]
         yield written, _absolute(file)
-    scene = parse(read_bytes(site.scene.path, "scene file"), site.scene.path).data
+    scene = parse(scene_text, site.scene.path).data
     files = {item["name"]: item["file"] for item in scene["objects"] if "file" in item}
     for item in site.scene.objects:
         if isinstance(item, Mesh):

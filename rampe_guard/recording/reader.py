@@ -12,10 +12,12 @@ import struct
 import zlib
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO, Final
 
+import lz4.frame
+import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
@@ -25,6 +27,8 @@ from mcap.stream_reader import breakup_chunk, get_chunk_data_stream
 from rampe_guard.errors import LogError
 
 MAGIC: Final = bytes([137, 77, 67, 65, 80, 48, 13, 10])
+MAX_CHUNK: Final = 256 * 2**20
+"""Of a chunk as its messages are [bytes]; recorders write some megabytes."""
 _RECORD = struct.Struct("<BQ")
 _PROVEN: Final = (Opcode.ATTACHMENT, Opcode.CHUNK)
 """Records with a checksum."""
@@ -122,7 +126,7 @@ class McapReading:
         """Channels and messages, in chunks or not."""
         for opcode, content in self._records(Opcode.CHUNK, Opcode.CHANNEL, Opcode.MESSAGE):
             if opcode == Opcode.CHUNK:
-                yield from breakup_chunk(Chunk.read(_stream(content)))
+                yield from breakup_chunk(unpacked(Chunk.read(_stream(content))))
             elif opcode == Opcode.CHANNEL:
                 yield Channel.read(_stream(content))
             else:
@@ -188,10 +192,33 @@ def _flaw(opcode: int, content: bytes) -> str:
             if said not in {0, zlib.crc32(content[:-4])}:
                 return "the checksum of an attachment does not match"
         elif opcode == Opcode.CHUNK:
-            get_chunk_data_stream(Chunk.read(_stream(content)), validate_crc=True)
+            get_chunk_data_stream(unpacked(Chunk.read(_stream(content))), validate_crc=True)
     except Exception as error:  # noqa: BLE001 - decompressors raise whatever they like
         return str(error) or type(error).__name__
     return ""
+
+
+def unpacked(chunk: Chunk) -> Chunk:
+    """The same chunk, not compressed: a small one cannot unfold to any size.
+
+    Raises:
+        McapError: it is larger than it says, or than `MAX_CHUNK`, or compressed in another way.
+    """
+    size = chunk.uncompressed_size
+    if not chunk.compression:
+        return chunk
+    if size > MAX_CHUNK:
+        raise McapError(f"a chunk of {size} bytes; more than {MAX_CHUNK} are refused")
+    if chunk.compression == "zstd":
+        with zstandard.ZstdDecompressor().stream_reader(chunk.data) as stream:
+            data = stream.read(size + 1)
+    elif chunk.compression == "lz4":
+        data = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1)
+    else:
+        raise McapError(f"a chunk is compressed by {chunk.compression[:20]!r}")
+    if len(data) != size:
+        raise McapError(f"a chunk has not the {size} bytes that it says")
+    return replace(chunk, compression="", data=data)
 
 
 def _stream(content: bytes) -> ReadDataStream:

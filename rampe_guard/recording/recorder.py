@@ -55,6 +55,7 @@ class Recorder:
         series: where it is written.
         say: log.
         notice: shown every message that came.
+        another: told of every batch before it is written; whether it belongs into another file.
         backlog: what may wait.
     """
 
@@ -66,10 +67,11 @@ class Recorder:
         series: Series,
         say: Sayer,
         notice: Callable[[Entry], None] = lambda _: None,
+        another: Callable[[], bool] = lambda: False,
         backlog: Backlog | None = None,
     ) -> None:
         self._site, self._taps, self._series = site, taps, series
-        self._say, self._notice = say, notice
+        self._say, self._notice, self._another = say, notice, another
         self._backlog = Backlog() if backlog is None else backlog
         key = f"{site.keys.base}/recorder"
         self._outbox = bus.outbox(key, "rampe.recorder.v1")
@@ -123,6 +125,8 @@ class Recorder:
         """Write all that waits, if the disk lets us."""
         try:
             while batch := self._backlog.first():
+                if self._another():
+                    self._series.finish({"reason": "another scene"})
                 self._series.append(batch)
                 self._backlog.written(len(batch))
                 self._refused = None

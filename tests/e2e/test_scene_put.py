@@ -11,6 +11,8 @@ from typing import Any
 
 import pytest
 
+from rampe_guard.recording import McapReading
+from rampe_guard.recording.recorded_site import other_files, recorded_site
 from rampe_guard.settings import load_site
 from tests.support import processes
 from tests.support.processes import BENCH, called, until
@@ -127,6 +129,31 @@ def test_a_guard_that_is_killed_comes_back_with_the_scene_that_was_put(
     # the site's own file is the way back, and needs nothing kept
     assert called("scene", "put", *args, OWN).returncode == 0
     assert in_force(live)["scene_hash"] == live.site.scene.content_hash
+
+
+def test_a_recorder_goes_on_in_a_file_that_explains_the_other_scene(
+    live: Station, tmp_path: Path
+) -> None:
+    put(live, OWN.read_text("utf-8"))
+    out = tmp_path / "work.mcap"
+    args = ["-m", "rampe_guard", "record", str(live.site_path), str(out)]
+    with processes.Process(tmp_path, "recorder", [*args, "--connect", live.endpoint]) as recorder:
+        recorder.wait_for("recording bench-excavator")
+        live.ears.wait("recorder", lambda b: b["messages"] > 0, 10.0, time.monotonic())
+        told = put(live, limit(1.32))
+        start_s = time.monotonic()
+        live.ears.wait("recorder", lambda b: b["files"] == 2, 10.0, start_s)
+        time.sleep(1.0)
+        recorder.signal_and_wait(signal.SIGTERM)
+    put(live, OWN.read_text("utf-8"))
+    hashes = []
+    for file in (out, tmp_path / "work-0002.mcap"):
+        reading = McapReading(file)
+        assert reading.warnings == ()
+        with recorded_site(reading) as site:
+            hashes.append(site.scene.content_hash)
+    assert hashes == [live.site.scene.content_hash, told["scene_hash"]]
+    assert other_files(McapReading(tmp_path / "work-0002.mcap")) == ()
 
 
 def test_what_was_learned_is_forgotten(live: Station) -> None:

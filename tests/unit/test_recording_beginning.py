@@ -88,9 +88,9 @@ def test_a_guard_with_other_files_is_told_once_and_noted(
     with caplog.at_level(logging.WARNING):
         for _ in range(3):
             begun.notice(entry(site, 0.0, "heartbeat", b"{"))
-            begun.notice(entry(site, 0.0, "heartbeat", beat(site.content_hash, "cafe")))
+            begun.notice(entry(site, 0.0, "heartbeat", beat("beef", "cafe")))
     assert len(caplog.records) == 1
-    assert "works with another scene than" in caplog.text
+    assert "works with another site file or URDF than" in caplog.text
     words = begun.head(2).metadata
     assert words[GUARD]["scene_hash"] == "cafe"
     assert (words[METADATA]["number"], words[METADATA]["operator"]) == ("2", "anna")
