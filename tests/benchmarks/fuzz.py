@@ -46,19 +46,20 @@ class Files:
 
 def start(folder: Path, module: str, *args: object) -> subprocess.Popen[str]:
     """A process with caches of its own, but for the compiled sweep."""
-    return subprocess.Popen(
-        [sys.executable, "-m", module, *map(str, args)],
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        stderr=(folder / f"{module}.err").open("a"),
-        text=True,
-        env={
-            **os.environ,
-            "OPENBLAS_NUM_THREADS": "1",
-            "RAMPE_GUARD_CACHE": str(folder / "cache"),
-            "STATE_DIRECTORY": str(folder / "state"),
-        },
-    )
+    with (folder / f"{module}.err").open("a") as err:
+        return subprocess.Popen(
+            [sys.executable, "-m", module, *map(str, args)],
+            cwd=ROOT,
+            stdout=subprocess.PIPE,
+            stderr=err,
+            text=True,
+            env={
+                **os.environ,
+                "OPENBLAS_NUM_THREADS": "1",
+                "RAMPE_GUARD_CACHE": str(folder / "cache"),
+                "STATE_DIRECTORY": str(folder / "state"),
+            },
+        )
 
 
 def lines_of(process: subprocess.Popen[str]) -> queue.SimpleQueue[str | None]:
@@ -68,8 +69,9 @@ def lines_of(process: subprocess.Popen[str]) -> queue.SimpleQueue[str | None]:
     out = process.stdout
 
     def read() -> None:
-        for line in out:
-            lines.put(line)
+        with out:
+            for line in out:
+                lines.put(line)
         lines.put(None)
 
     threading.Thread(target=read, daemon=True).start()

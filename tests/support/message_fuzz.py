@@ -50,6 +50,8 @@ STRETCH = 1000
 """Turns between two choices of what is fed."""
 SETTLE = 300
 """Turns of sound messages alone before a strict stretch is judged: silences are over by then."""
+REACH = 120
+"""Turns in which the arm gets to the crate."""
 SLOWEST_S = 1.0
 SCENE = ROOT / "config" / "scenes" / "bench.yaml"
 _EACH = (1, 8, 32, 32, 32, 32)
@@ -213,7 +215,7 @@ class Fuzz:
         self._each = rng.choice(_EACH)
         self._driver.task = "hold" if self._strict else "work"
         if not before:
-            self._settled = self._turns + SETTLE
+            self._settled = self._turns + (SETTLE if self._turns > 1 else REACH)
         found.refused = self._screen.beat.get("rejected", {})
         if (not found.memory_mb and found.messages > self._wanted / 5) or self():
             found.memory_mb.append(cost(os.getpid()).own_mb)
