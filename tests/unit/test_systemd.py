@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import socket
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,27 +11,7 @@ import pytest
 from rampe_guard.runtime.minders import Minders
 from rampe_guard.runtime.systemd import MAX_STATUS, Watchdog
 from rampe_guard.runtime.turning import PIPE, Turning
-
-
-class Manager:
-    """Listens as systemd does."""
-
-    def __init__(self, address: str) -> None:
-        self.address = address
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        self._socket.settimeout(0.0)
-        self._socket.bind(address.replace("@", "\0", 1))
-
-    def heard(self) -> list[str]:
-        words = []
-        while True:
-            try:
-                words.append(self._socket.recv(4096).decode())
-            except BlockingIOError:
-                return words
-
-    def close(self) -> None:
-        self._socket.close()
+from tests.support.manager import Manager
 
 
 @pytest.fixture(params=["path", "abstract"])
