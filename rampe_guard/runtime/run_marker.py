@@ -30,6 +30,7 @@ _MOST_BYTES: Final = 1 << 16
 _MOST: Final = 20
 """Alerts that are remembered; the newest ones."""
 _END_S: Final = 0.3
+_BLIND: Final = "not monitoring"
 _TOLD: Final = "canary failed"
 """That is told by the supervisor anyway."""
 _UNSEEN: Final = ("unacked", "rtn_unacked")
@@ -100,7 +101,7 @@ class RunMarker:
         elif alert.source == "contact":
             self._new[alert.alert_id] = f"{alert.link or 'arm'} at {alert.zone}"
         elif alert.source == "system" and alert.level == "warning" and _TOLD not in alert.text:
-            self._new[alert.alert_id] = "not monitoring"
+            self._new[alert.alert_id] = _BLIND
         if self._unseen() != before:
             self._save()
 
@@ -113,7 +114,9 @@ class RunMarker:
         return (wire.Reason(code="alerts_not_kept", text=text, key=None),)
 
     def _unseen(self) -> tuple[str, ...]:
-        return tuple(dict.fromkeys((*self.unseen, *self._new.values())))[-_MOST:]
+        words = dict.fromkeys((*self.unseen, *self._new.values()))
+        # contacts first: a display has room for one of them
+        return tuple(sorted(list(words)[-_MOST:], key=_BLIND.__eq__))
 
     def _save(self) -> None:
         if self._saver is not None:

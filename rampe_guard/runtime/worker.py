@@ -158,8 +158,8 @@ class Worker:
         message = self._scribe.alert(event, compute_ms)
         payload = wire.encode(message)
         self._alerts.put(payload)
+        self._marker.note(message)  # repeats too: a contact that begins may be no transition
         if event.kind == "transition":
-            self._marker.note(message)
             self._say.info(
                 f"{message.level}: {message.text}",
                 alert_id=message.alert_id,

@@ -53,7 +53,12 @@ def main() -> None:
     args = parser.parse_args()
     site, session = load_site(args.site), open_session(args.endpoint)
     over = threading.Event()
-    threading.Thread(target=lambda: (sys.stdin.read(), over.set()), daemon=True).start()
+
+    def wait() -> None:
+        sys.stdin.read()
+        over.set()
+
+    threading.Thread(target=wait, daemon=True).start()
     print("flooding", flush=True)
     start_s = time.monotonic()
     sent = 0

@@ -86,5 +86,5 @@ def station(folder: Path, site_path: Path = BENCH, *more: str) -> Iterator[Stati
         made = Station(site, site_path, endpoint, router, guard, rig, ears)
         ears.wait("heartbeat", lambda b: b["status"] == "ok", 20.0, 0.0)
         yield made
-        assert guard.alive, guard.err
-        assert "Traceback" not in guard.err, guard.err
+        assert made.guard.alive, made.guard.err  # a test may have started another
+        assert "Traceback" not in made.guard.err, made.guard.err
