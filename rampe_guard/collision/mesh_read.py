@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rampe_guard.collision.mesh_topology import IntArray
+from rampe_guard.collision.xml_check import check_xml
 from rampe_guard.errors import GeometryError
 
 if TYPE_CHECKING:
@@ -16,6 +17,10 @@ if TYPE_CHECKING:
 
     from rampe_guard.core.types import FloatArray
 
+FORMATS = (".stl", ".obj", ".ply", ".dae", ".off", ".glb")
+"""All whole in one file; none of their readers runs anything."""
+_WITH_MATERIALS = ("obj", "ply", "glb")
+"""Their pictures and colours are no use here, and pictures may unfold to any size."""
 MAX_TRIANGLES = 2_000_000
 MAX_BYTES = 2**30
 """Larger files are refused unread: two million triangles need half of it in the wordiest format."""
@@ -48,13 +53,17 @@ class RawMesh:
 
 
 def read_mesh(path: Path) -> RawMesh:
-    """Read an STL, OBJ, DAE or other mesh file that trimesh knows.
+    """Read a mesh file of one of `FORMATS`, and no other file that it may name.
 
     Raises:
         GeometryError: naming the file and what is wrong with it.
     """
     if not path.is_file():
         raise GeometryError(f"{path}: no such mesh file")
+    if path.suffix.lower() not in FORMATS:
+        raise GeometryError(
+            f"{path}: is none of {', '.join(FORMATS)} by its ending; export it as one of them"
+        )
     size = path.stat().st_size
     if size > MAX_BYTES:
         raise GeometryError(
@@ -69,14 +78,36 @@ def read_mesh(path: Path) -> RawMesh:
         import trimesh  # noqa: PLC0415  # half a second, which our own formats need not wait for
 
         # trimesh cannot say how many there are before it has read them all
-        scene = trimesh.load_scene(str(path), process=False)
+        kind = path.suffix.lower().removeprefix(".")
+        plain = {"skip_materials": True} if kind in _WITH_MATERIALS else {}
+        with path.open("rb") as file:
+            if kind == "dae":
+                check_xml(file, str(path))
+                file.seek(0)
+            scene = trimesh.load_scene(
+                file, file_type=kind, resolver=_NoOther(), process=False, **plain
+            )
         loaded = scene.to_mesh()
         vertices, faces = np.asarray(loaded.vertices, float), np.asarray(loaded.faces, np.int64)
         return RawMesh(vertices, faces, _unit(scene))
-    except GeometryError:
-        raise
+    except GeometryError as error:
+        said = str(error)
+        if said.startswith(str(path)):
+            raise
+        raise GeometryError(f"{path}: {said}") from None
     except Exception as error:  # readers of foreign formats raise whatever they like
         raise GeometryError(f"{path}: cannot be read as a mesh: {error}") from error
+
+
+class _NoOther(dict[str, bytes]):
+    """In the place of trimesh's resolvers, which would open files beside the mesh, or fetch."""
+
+    def __missing__(self, name: str) -> bytes:
+        raise GeometryError(f"it names another file, {name[:80]!r}; export it whole in one file")
+
+    def get(self, name: str, default: object = None) -> bytes:  # noqa: ARG002
+        """As above: nothing is there."""
+        return self[name]
 
 
 def refuse_too_many(triangles: int, name: str) -> None:

@@ -22,6 +22,7 @@ import numpy as np
 from rampe_guard.collision import mesh as meshes
 from rampe_guard.collision import tree_build, tree_split
 from rampe_guard.collision.mesh import TriangleMesh, check_extent, load_mesh
+from rampe_guard.collision.mesh_read import FORMATS
 from rampe_guard.collision.shape import Shape, shape_of
 from rampe_guard.collision.shape_file import MAGIC, BrokenShapeError, read_shape, write_shape
 from rampe_guard.errors import GeometryError
@@ -41,8 +42,6 @@ TREE_SUFFIX: Final = ".urdf"
 _KEPT: Final = {SUFFIX, TREE_SUFFIX}
 _DIGEST: Final = hashlib.sha256().digest_size
 _UNFINISHED: Final = ".unfinished-"
-_REFERRING: Final = {".gltf"}
-"""Formats whose vertices lie in other files: the file's own bytes do not tell what it holds."""
 _MADE_BY: Final = (
     f"{MAGIC!r} tree {tree_build.VERSION} leaf {tree_split.LEAF} hulls {tree_build.HULLS}"
     f" trimesh {version('trimesh')}"
@@ -235,8 +234,8 @@ def cached_shape(
 
 def _file_key(path: Path, factors: FloatArray) -> str | None:
     """What names the shape of a file: its bytes, its kind, its scale and our version."""
-    if path.suffix.lower() in _REFERRING:
-        return None
+    if path.suffix.lower() not in FORMATS:
+        return None  # reading it will say why
     try:
         with path.open("rb") as file:
             content = hashlib.file_digest(file, "sha256").hexdigest()

@@ -107,6 +107,8 @@ def _parse(path: Path) -> Tree:
         raise GeometryError(f"{path}: no such URDF file")
     try:
         tree = read_tree(path)
+    except GeometryError:
+        raise
     except Exception as error:  # the reader raises whatever it likes
         raise GeometryError(f"{path}: cannot be read as a URDF: {error}") from error
     if not tree.links:

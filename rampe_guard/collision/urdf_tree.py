@@ -7,6 +7,7 @@ with the same bytes is kept beside the shapes (see `shape_cache`), and then none
 from __future__ import annotations
 
 import hashlib
+import io
 from contextlib import suppress
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, Final
@@ -15,10 +16,13 @@ import msgspec
 import numpy as np
 
 from rampe_guard.collision.shape_cache import default_cache
+from rampe_guard.collision.xml_check import check_xml
+from rampe_guard.errors import GeometryError
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+MAX_BYTES: Final = 16 * 2**20
 _LAYOUT: Final = 1
 """Count up when the classes below change."""
 
@@ -114,26 +118,32 @@ class Tree(msgspec.Struct, frozen=True):
 def read_tree(path: Path) -> Tree:
     """The tree of a URDF; meshes are named, not read.
 
-    Raises whatever yourdfpy does where the file is no URDF.
+    Raises whatever yourdfpy does where the file is no URDF, and GeometryError where it is no
+    plain XML.
     """
     said = f"urdf {_LAYOUT} yourdfpy {version('yourdfpy')} ".encode()
-    key = hashlib.sha256(said + path.read_bytes()).hexdigest()
+    with path.open("rb") as file:
+        content = file.read(MAX_BYTES + 1)
+    if len(content) > MAX_BYTES:
+        raise GeometryError(f"{path}: is larger than {MAX_BYTES // 2**20} MB; give a smaller URDF")
+    key = hashlib.sha256(said + content).hexdigest()
     cache = default_cache()
     kept = cache.get_tree(key)
     if kept is not None:
         with suppress(msgspec.MsgspecError):  # else it is read anew
             return msgspec.msgpack.decode(kept, type=Tree)
-    tree = _read(path)
+    check_xml(io.BytesIO(content), str(path))
+    tree = _read(content)
     cache.put_tree(key, msgspec.msgpack.encode(tree))
     return tree
 
 
-def _read(path: Path) -> Tree:
+def _read(content: bytes) -> Tree:
     # only here: it takes a second to import
     import yourdfpy  # noqa: PLC0415
 
     robot = yourdfpy.URDF.load(
-        str(path), load_meshes=False, load_collision_meshes=False, build_scene_graph=False
+        io.BytesIO(content), load_meshes=False, load_collision_meshes=False, build_scene_graph=False
     ).robot
     return Tree(
         str(robot.name),

@@ -144,7 +144,7 @@ def test_files_that_are_no_urdf(tmp_path: Path) -> None:
     for text in ("", "<robot", "not xml"):
         path = tmp_path / "broken.urdf"
         path.write_text(text)
-        with pytest.raises(GeometryError, match="cannot be read as a URDF"):
+        with pytest.raises(GeometryError, match="not well-formed XML"):
             load_arm(describe(path, ["turn"]))
 
 

@@ -289,13 +289,13 @@ def test_bad_files_and_scales_are_refused_not_kept(tmp_path: Path) -> None:
     assert len(list((tmp_path / "cache").iterdir())) == 1
 
 
-def test_formats_that_refer_to_other_files_are_not_kept(tmp_path: Path) -> None:
+def test_formats_that_refer_to_other_files_are_refused(tmp_path: Path) -> None:
     cache = ShapeCache(tmp_path / "cache")
     exported = trimesh.creation.box().export(file_type="gltf")
     for name, data in exported.items():
         (tmp_path / name).write_bytes(data)
-    shape = load_shape(tmp_path / "model.gltf", cache=cache)
-    assert shape.extent_m == pytest.approx(1.0)
+    with pytest.raises(GeometryError, match=r"model\.gltf: is none of \.stl, .*export it"):
+        load_shape(tmp_path / "model.gltf", cache=cache)
     assert not (tmp_path / "cache").exists()
 
 
