@@ -53,7 +53,7 @@ valid_name() {
 alternative_names() {
   local address list=''
   for address in "$@"; do
-    if [[ $address =~ ^[0-9.]+$ || $address == *:* ]]; then
+    if [[ $address =~ ^[0-9.]+$ || $address =~ ^[0-9A-Fa-f:.]*:[0-9A-Fa-f:.]*$ ]]; then
       list+=",IP:$address"
     elif [[ $address =~ ^[A-Za-z0-9.-]+$ ]]; then
       list+=",DNS:$address"
@@ -108,7 +108,7 @@ make_certificate() {
   cp "$folder/ca/ca.crt" "$work/ca.crt"
   rm "$work/new.cnf" "$work/new.csr" "$work/said"
   if [ -e "$folder/$common" ]; then
-    # the key last: until then the old pair is whole, and a reader retries on a pair that is not
+    # one after the other: who starts in this very moment finds a pair that does not fit, and says so
     mv -f "$work/ca.crt" "$work/tls.crt" "$work/tls.key" "$folder/$common/"
     rm -rf "$work"
   else
