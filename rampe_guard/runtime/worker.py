@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import gc
 import os
+import sys
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -42,6 +43,9 @@ from rampe_guard.runtime.zenoh_io import Bus
 _WAKE_S = 0.001
 """Sleep between looks at the inboxes: adds half of it to the latency, costs 2 % of a core."""
 _BEAT_S = 0.2
+SWITCH_S = 0.001
+"""Longest the loop waits for a thread that saves, logs or serves metrics to let go of Python (its
+default of 5 ms would be felt; see tests/benchmarks/saving.py)."""
 
 
 def boot_id() -> str:
@@ -109,6 +113,7 @@ class Worker:
         Returns:
             Whether it ended by itself, because the canary failed.
         """
+        sys.setswitchinterval(SWITCH_S)
         gc.collect()
         gc.freeze()  # meshes and models are for life: do not walk them at every collection
         last_step_s = last_beat_s = float("-inf")
