@@ -84,7 +84,7 @@ def main() -> int:
         f"\n{verdict.pushes} pushes against the crate: {verdict.warned} shown as imminent in time,"
         f" {verdict.unwatched} while it was shown that nobody watches, {len(verdict.missed)} missed"
     )
-    for line in broken:
+    for line in (*broken, *verdict.notes):
         print("BROKEN:", line)
     return 1 if broken else 0
 

@@ -190,6 +190,7 @@ def judge(ground: Ground, soak: Soak) -> dict[str, Any]:
     failed += [f"protection lost {a:.1f} to {b:.1f} s" for a, b in verdict.unexplained]
     if verdict.wrong_s:
         failed.append(f"less than the alert was shown for {verdict.wrong_s:.2f} s")
+        failed += verdict.notes
     if last > FLAT * first and last > first + FLAT_MS:
         failed.append(f"p99 rose from {first:.2f} to {last:.2f} ms")
     if growth > GROWTH_MB_H:

@@ -20,7 +20,7 @@ def bench_copy(
     Args:
         folder: that is there.
         more: blocks of YAML that it has beside its own.
-        machine: the part of its keys that is the machine's.
+        machine: its name, also in its keys.
         scene: instead of its own.
         name: of the file.
     """
@@ -29,6 +29,7 @@ def bench_copy(
         ("../../geometry", str(ROOT / "geometry")),
         ("../scenes/bench.yaml", str(scene or ROOT / "config" / "scenes" / "bench.yaml")),
         ("rampe/bench/excavator", f"rampe/bench/{machine}"),
+        ("machine: bench-excavator", f"machine: {machine}"),
     ):
         assert old in text, old
         text = text.replace(old, new)

@@ -29,6 +29,7 @@ ZONE = "crate"
 TICK_S = 0.05
 STEADY_S = 1.3
 """Protection that is lost again sooner was never back: longer than a time-out of the inputs."""
+NOTES = 20
 GRACE_S = 0.3
 """How long the arm may push before the alert must be shown: it should have stood long before."""
 
@@ -43,6 +44,7 @@ class Verdict:
         unwatched: how often protection was known to be lost instead.
         missed: neither of both, with when [s].
         wrong_s: time for which less than imminent was shown while it pushed, after the grace [s].
+        notes: what was shown then, and by which alert, for whoever looks into it.
         leads_s: how long before the push the alert stood [s].
         lost: intervals of lost protection (from, to) [s].
         unexplained: those that no declared fault explains.
@@ -53,6 +55,7 @@ class Verdict:
     unwatched: int = 0
     missed: list[float] = field(default_factory=list)
     wrong_s: float = 0.0
+    notes: list[str] = field(default_factory=list)
     leads_s: list[float] = field(default_factory=list)
     lost: list[tuple[float, float]] = field(default_factory=list)
     unexplained: list[tuple[float, float]] = field(default_factory=list)
@@ -62,11 +65,19 @@ class Ground:
     """Everything that runs; use `proving_ground`."""
 
     def __init__(
-        self, folder: Path, site_path: Path, *, rate_hz: float, seed: int, clock: Path | None
+        self,
+        folder: Path,
+        site_path: Path,
+        *,
+        rate_hz: float,
+        seed: int,
+        clock: Path | None,
+        routers: int,
     ) -> None:
         self.folder, self.site_path, self.clock = folder, site_path, clock
         self.site = load_site(site_path)
-        self.endpoint = processes.free_endpoint()
+        self.endpoints = [processes.free_endpoint() for _ in range(routers)]
+        self.endpoint = self.endpoints[0]
         self.rate_hz, self._seed = rate_hz, seed
         self.verdict = Verdict()
         self._truth = folder / "truth.jsonl"
@@ -84,9 +95,11 @@ class Ground:
             raise
 
     def _start(self) -> None:
-        self.router = self._keep(processes.router(self.folder, self.endpoint))
+        self.routers = [self._keep(self._new_router(n)) for n in range(len(self.endpoints))]
         self.machine = self._keep(self._new_machine())
-        self.witness = self._stack.enter_context(Witness(self.endpoint, self.site.keys.base))
+        # it prefers the last: what it hears has gone from one router to the other
+        witness = Witness(self.endpoints[::-1], self.site.keys.base)
+        self.witness = self._stack.enter_context(witness)
         self.viewer = self._keep(self._new_viewer())
         self.guard = self._keep(self._new_guard())
         self._worker = processes.guarding(self.guard)
@@ -102,7 +115,7 @@ class Ground:
         process.close()
 
     def _new_machine(self) -> Process:
-        words = ["-m", "tests.support.pusher", self.endpoint, str(self.site_path)]
+        words = ["-m", "tests.support.pusher", ",".join(self.endpoints), str(self.site_path)]
         more = [str(self._truth), "--rate", str(self.rate_hz), "--seed", str(self._seed)]
         process = Process(self.folder, "machine", [*words, *more], talk=True)
         process.wait_for("ready")
@@ -110,9 +123,10 @@ class Ground:
 
     def _new_guard(self) -> Process:
         if self.clock is None:
-            return processes.guard(self.folder, self.site_path, self.endpoint)
+            more = self._connect()[2:]
+            return processes.guard(self.folder, self.site_path, self.endpoint, *more)
         words = ["-m", "tests.support.clock_guard", str(self.clock), "run", str(self.site_path)]
-        process = Process(self.folder, "guard", [*words, "--connect", self.endpoint])
+        process = Process(self.folder, "guard", [*words, *self._connect()])
         try:
             process.wait_for("guarding on")
         except BaseException:
@@ -122,7 +136,29 @@ class Ground:
 
     def _new_viewer(self) -> Process:
         words = ["-m", "rampe_guard", "watch", str(self.site_path), "--json"]
-        return Process(self.folder, "viewer", [*words, "--connect", self.endpoint])
+        return Process(self.folder, "viewer", [*words, *self._connect()])
+
+    def _connect(self) -> list[str]:
+        return [word for endpoint in self.endpoints for word in ("--connect", endpoint)]
+
+    def _new_router(self, number: int) -> Process:
+        """One of several is linked to the one behind it, and links itself again and again."""
+        if len(self.endpoints) == 1:
+            return processes.router(self.folder, self.endpoint)
+        retry = {"period_init_ms": 100, "period_max_ms": 500}
+        others = self.endpoints[number + 1 :]
+        config = {
+            "mode": "router",
+            "listen": {"endpoints": [self.endpoints[number]]},
+            "connect": {"endpoints": others, "exit_on_failure": False, "retry": retry},
+            "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
+        }
+        path = self.folder / f"router-{number}.json5"
+        path.write_text(json.dumps(config), "utf-8")
+        words = ["-m", "rampe_guard.runtime.router", "--config", str(path)]
+        process = Process(self.folder, f"router-{number}", words)
+        process.wait_for("ready")
+        return process
 
     # What is done to it.
 
@@ -130,9 +166,14 @@ class Ground:
         """Change what the machine does; see `tests.support.pusher`."""
         self.machine.tell(json.dumps(words))
 
-    def restart_router(self) -> None:
+    @property
+    def router(self) -> Process:
+        """The first of them."""
+        return self.routers[0]
+
+    def restart_router(self, number: int = 0) -> None:
         """A new router at the same place; returns when it listens."""
-        self.router = self._keep(processes.router(self.folder, self.endpoint))
+        self.routers[number] = self._keep(self._new_router(number))
 
     def restart_machine(self) -> None:
         """A new process that moves the machine, at rest."""
@@ -191,6 +232,9 @@ class Ground:
         verdict = self.verdict
         if shown not in ("imminent", LOST):
             verdict.wrong_s += min(passed_s, now_s - since_s - GRACE_S)
+            if len(verdict.notes) < NOTES:
+                newest = self.witness.newest(ZONE)
+                verdict.notes.append(f"{now_s - since_s:.2f} s after a push: {shown}: {newest}")
         if self._judged:
             return
         self._judged = True
@@ -300,6 +344,7 @@ def proving_ground(
     rate_hz: float = 100.0,
     seed: int = 1,
     clock: Path | None = None,
+    routers: int = 1,
 ) -> Iterator[Ground]:
     """Start all and wait until the guard watches; end all.
 
@@ -310,8 +355,9 @@ def proving_ground(
         seed: of what the machine does.
         clock: a file that says by how much the guard's wall clock is off [s]; without it the guard
             is the shipped program.
+        routers: how many; everybody knows all of them.
     """
-    ground = Ground(folder, site_path, rate_hz=rate_hz, seed=seed, clock=clock)
+    ground = Ground(folder, site_path, rate_hz=rate_hz, seed=seed, clock=clock, routers=routers)
     try:
         ground.wait(lambda: ground.witness.status(0.0) == "ok", 30.0, "status ok")
         ground.verdict = Verdict()

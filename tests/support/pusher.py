@@ -208,14 +208,14 @@ def work(driver: Driver, sender: Sender, truth: Path, period_s: float) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("endpoint")
+    parser.add_argument("endpoint", help="or several, with commas")
     parser.add_argument("site")
     parser.add_argument("truth", type=Path)
     parser.add_argument("--rate", type=float, default=100.0)
     parser.add_argument("--seed", type=int, default=1)
     args = parser.parse_args()
     site = load_site(args.site)
-    session = open_session(args.endpoint)
+    session = open_session(args.endpoint.split(","))
     try:
         keys = site.keys.joystick, site.keys.actuators
         driver = Driver([a.max_velocity for a in site.guard.actuators], args.seed)

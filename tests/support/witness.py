@@ -27,6 +27,9 @@ class _Active:
     level: str
     until_s: float
     text: str
+    state: str
+    quality: str
+    stamp_s: float
 
 
 @dataclass(slots=True)
@@ -74,6 +77,16 @@ class Witness:
         """Of the newest heartbeat, if it came after ``since_s``."""
         with self._lock:
             return str(self.beats.newest["status"]) if self.beats.at_s > since_s else None
+
+    def newest(self, zone: str) -> str:
+        """The alert of a zone and the heartbeat as they are, for people."""
+        with self._lock:
+            beat = self.beats.newest
+            age_s = time.monotonic() - self.beats.at_s
+            return (
+                f"{self._active.get(zone)}, now {time.time():.3f}; {beat.get('status')}"
+                f" {[r['code'] for r in beat.get('reasons', ())]} {age_s:.2f} s ago"
+            )
 
     def raised_s(self, zone: str) -> float | None:
         """Since when a zone has been imminent without a break; None if it is not."""
@@ -161,7 +174,12 @@ class Witness:
             self._active.pop(zone, None)
         else:
             until_s = at_s + body["expires_after_s"]
-            self._active[zone] = _Active(level, until_s, body["text"])
+            self._active[zone] = _Active(
+                level,
+                until_s,
+                *(body["text"], body["state"], body["quality"]),
+                body["stamp"] or 0.0,
+            )
         if zone is not None and level != "imminent":
             self._raised.pop(zone, None)
         elif zone is not None:
