@@ -80,7 +80,7 @@ class Mutator:
         """Changed as JSON; what is not JSON is left alone."""
         try:
             tree = json.loads(good)
-        except ValueError:
+        except (ValueError, RecursionError):
             return good
         raws: list[str] = []
         for _ in range(self._rng.choice((1, 1, 1, 2, 3))):
