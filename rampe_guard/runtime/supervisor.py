@@ -32,7 +32,7 @@ UNTRUSTED = 3
 """Exit code of a guard whose canary failed."""
 FINAL = (0, 2, 130)
 """Exit codes with which a guard ends on purpose: done, what a user must mend, interrupted."""
-FIRST_DELAY_S, LONGEST_DELAY_S = 0.5, 10.0
+FIRST_DELAY_S, LONGEST_DELAY_S = 0.1, 10.0
 SHORT_LIFE_S = 10.0
 """A guard that dies younger makes the next one wait twice as long."""
 GRACE_S = 10.0

@@ -80,7 +80,7 @@ def test_a_crash_is_told_by_name_until_acknowledged_and_guarded_again(
         )
         assert guard.signal_and_wait(signal.SIGTERM) <= 2.0
         assert guard.popen.returncode == 0
-        line = r"rampe-guard: the guard died of SIGSEGV; it is started anew in 0.5 s"
+        line = r"rampe-guard: the guard died of SIGSEGV; it is started anew in 0.1 s"
         assert len(re.findall(line, guard.err)) == 1
         assert "Fatal Python error: Segmentation fault" in guard.err  # where it was
 
