@@ -26,10 +26,13 @@ from pathlib import Path
 from typing import Any
 
 from rampe_guard import kernel_cache
+from tests.support.gauges import cost
 from tests.support.processes import ROOT
 
 HANG_S = 10.0
-"""A file may take as long as its geometry takes to build, no longer."""
+"""A file may take as long as its geometry takes to build, no longer: of processor time."""
+LOST_S = 300.0
+"""Without a word for so long it is stuck, whatever it waits for."""
 GROWTH_MB = 8.0
 """Between a fifth of the messages and all of them: the caches of a guard at work."""
 
@@ -42,6 +45,11 @@ class Files:
     slowest_ms: list[tuple[float, int, str]] = field(default_factory=list)
     over_second: int = 0
     wrong: list[str] = field(default_factory=list)
+
+    def note(self, what: str) -> None:
+        """Something did not hold."""
+        self.wrong.append(what)
+        print(what, flush=True)
 
 
 def start(folder: Path, module: str, *args: object) -> subprocess.Popen[str]:
@@ -96,7 +104,7 @@ def fuzz_files(folder: Path, seed: int, first: int, last: int, found: Files) -> 
         lines = lines_of(process)
         limit_s = 60.0  # it has to load
         try:
-            while (line := lines.get(timeout=limit_s)) is not None:
+            while (line := _next_line(process, lines, limit_s)) is not None:
                 number, kind, outcome, took_ms = line.split()
                 limit_s, first = HANG_S, int(number) + 1
                 found.outcomes[kind, outcome] += 1
@@ -104,16 +112,38 @@ def fuzz_files(folder: Path, seed: int, first: int, last: int, found: Files) -> 
                 found.slowest_ms.append((float(took_ms), int(number), kind))
                 found.slowest_ms = sorted(found.slowest_ms, reverse=True)[:5]
                 if outcome == "BAD":
-                    found.wrong.append(f"file {number} ({kind}): see {folder}")
-        except queue.Empty:
+                    found.note(f"file {number} ({kind}): see {folder}")
+        except TimeoutError:
             process.kill()
-            found.wrong.append(f"file {first} hung for more than {limit_s:g} s: see {folder}")
+            found.note(f"file {first} hung for more than {limit_s:g} s: see {folder}")
             first += 1
         finally:
             code = end(process)
         if code != 0 and first < last and not _told(found, first - 1):
-            found.wrong.append(f"file {first}: the process died with {code}: see {folder}")
+            found.note(f"file {first}: the process died with {code}: see {folder}")
             first += 1
+
+
+def _next_line(
+    process: subprocess.Popen[str], lines: queue.SimpleQueue[str | None], cpu_s: float
+) -> str | None:
+    """What it says next, None at its end; TimeoutError after so much of its processor time [s]."""
+    began_s, used_s = time.monotonic(), _cpu_s(process.pid)
+    while True:
+        try:
+            return lines.get(timeout=1.0)
+        except queue.Empty:
+            lost = time.monotonic() - began_s > LOST_S
+            if lost or _cpu_s(process.pid) - used_s > cpu_s:
+                raise TimeoutError from None
+
+
+def _cpu_s(pid: int) -> float:
+    """0 of a process that has ended."""
+    try:
+        return cost(pid).cpu_s
+    except OSError:
+        return 0.0
 
 
 def _told(found: Files, number: int) -> bool:
@@ -126,7 +156,7 @@ def fuzz_messages(folder: Path, messages: int, seed: int, found: dict[str, Any])
     process = start(folder, "tests.support.message_fuzz", folder, messages, seed)
     lines = lines_of(process)
     try:
-        while (line := lines.get(timeout=120.0)) is not None:
+        while (line := lines.get(timeout=LOST_S)) is not None:
             found.update(json.loads(line))
     except queue.Empty:
         found.setdefault("wrong", []).append("it hung")

@@ -33,7 +33,7 @@ from tests.support.bench_site import bench_copy
 from tests.support.mutator import Mutator
 from tests.support.processes import ROOT
 
-KINDS = ("site", "scene", "urdf", "mesh")
+KINDS = ("site", "scene", "urdf", "mesh", "site", "scene", "urdf")
 NUMBERS = (
     *("0", "-1", "1e9", "-1e9", "1e308", "1e400", ".nan", ".inf", "nan", "inf", "1e-300", "-0.0"),
     *("1_0", "0x1F", "12:30", "yes", "null", "~", "[]", "{}", "''", "1e5", "100000", "2.5"),
