@@ -129,8 +129,8 @@ def window(
 def show(windows: list[Window], costs: list[Cost], router: Cost, console: Console) -> None:
     """Print it, and the straight line."""
     table = Table(
-        *("rate [Hz]", "steps a guard [1/s]", "a guard [% of a core], median, most"),
-        *("router [%]", "alert after [ms], p50, p99", "loop p99 [ms]", "watching"),
+        *("rate, Hz", "steps a guard, 1/s", "a guard, % of a core: median, most"),
+        *("router, %", "alert after, ms: p50, p99", "loop p99, ms", "watching"),
         box=None,
     )
     for w in windows:
