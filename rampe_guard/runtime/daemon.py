@@ -26,7 +26,7 @@ from rampe_guard.runtime.stopping import StopFlag
 from rampe_guard.runtime.store_keeper import Keeper
 from rampe_guard.runtime.supervisor import UNTRUSTED, restarted_after
 from rampe_guard.runtime.worker import Worker
-from rampe_guard.runtime.zenoh_io import Bus
+from rampe_guard.runtime.zenoh_io import Bus, check_configuration
 from rampe_guard.settings import MetricsSettings, Site, for_operator, load_site
 
 
@@ -60,6 +60,7 @@ def run(
         raise SettingsError(
             f"{site.path}: format: {site.format!r} is not supported by this version; use json"
         )
+    check_configuration(site.zenoh)  # before meshes are loaded, which takes a while
     where = MetricsSettings(*metrics) if metrics else site.metrics
     with served(where, say, again=restarted_after() is not None) as show:
         return _guard(site, stop, say, minders, show)

@@ -25,6 +25,7 @@ from rampe_guard.core.situation_memory import SituationMemory
 from rampe_guard.core.types import Inputs
 from rampe_guard.runtime.audit import Audit
 from rampe_guard.runtime.canary_watch import CanaryWatch
+from rampe_guard.runtime.expiry import Expiry
 from rampe_guard.runtime.health import Own, Pulse, TimedSweeper
 from rampe_guard.runtime.intake import Intake
 from rampe_guard.runtime.messages import Scribe
@@ -101,6 +102,7 @@ class Worker:
         audit = Audit(say)
         self._orders = Orders(bus, site, self._guard, audit, self._order_done, keeper.hurry)
         self._scene = SceneDesk(bus, site, scenes, machine.sweeper, audit, self._change_scene)
+        self._expiry = Expiry(site.zenoh)
         bus.declare_alive(f"{base}/alive")
         self._prediction: wire.Prediction | None = None
         self._status: str | None = None
@@ -178,6 +180,7 @@ class Worker:
     def _beat(self, now_s: float) -> None:
         connected = self._bus.connected
         extra = [*self._keeper.reasons(), *self._scene.reasons(), *self._marker.reasons()]
+        extra += self._expiry.reasons(_unix_s(now_s))
         if not connected:
             extra.append(wire.Reason(code="no_router", text="no Zenoh router", key=None))
         snapshot = self._guard.snapshot(now_s)

@@ -14,6 +14,7 @@ import pytest
 
 from rampe_guard.errors import SettingsError
 from rampe_guard.runtime.certificates import DAY_S, check_files, validity
+from rampe_guard.runtime.expiry import Expiry
 from rampe_guard.runtime.zenoh_io import check_configuration
 from rampe_guard.settings import TlsFiles, load_site
 from tests.support import processes
@@ -99,7 +100,12 @@ def quarry(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Quarry]:
         },
     }
     (folder / "router.json5").write_text(json.dumps(config))
-    args = ["-m", "rampe_guard.runtime.router", "--config", folder / "router.json5"]
+    args: list[str | Path] = [
+        "-m",
+        "rampe_guard.runtime.router",
+        "--config",
+        folder / "router.json5",
+    ]
     process = Process(folder, "router", args)
     try:
         process.wait_for("ready", 60.0)
@@ -173,6 +179,16 @@ class TestBeforeItIsUsed:
         files = self.files(quarry)
         with pytest.raises(SettingsError, match=said):
             check_files(TlsFiles(str(tmp_path / "ca.crt"), files.certificate, files.key))
+
+    def test_its_end_is_told_two_weeks_before(self, quarry: Quarry) -> None:
+        zenoh, now = load_site(quarry.site("guard")).zenoh, time.time()
+        expiry = Expiry(zenoh, now)
+        assert expiry.reasons(now + 75 * DAY_S) == ()
+        (reason,) = expiry.reasons(now + 80 * DAY_S)
+        assert reason.code == "certificate_expiring"
+        assert "ends in 10.0 days" in reason.text
+        assert "has ended" in expiry.reasons(now + 91 * DAY_S)[0].text
+        assert Expiry(load_site(BENCH).zenoh, now).reasons(now + 1000 * DAY_S) == ()
 
     def test_check_says_so_too(self, quarry: Quarry) -> None:
         site = load_site(quarry.site("guard"))
