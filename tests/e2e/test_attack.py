@@ -5,11 +5,11 @@ Router, access list and certificates are those that deploy/ makes; the guard is 
 
 from __future__ import annotations
 
+import contextlib
 import json
 import socket
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,7 @@ from rampe_guard.settings import ZenohSettings, load_site
 from tests.support.ears import open_session
 from tests.support.fort import BASE, MACHINE, Fort, fort, secure_router
 from tests.support.pki import HAVE_OPENSSL, Pki
-from tests.support.processes import BENCH, free_endpoint, until
+from tests.support.processes import BENCH, ROOT, Process, free_endpoint, until
 from tests.support.rig import Rig
 from tests.support.station import REST
 
@@ -45,7 +45,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fort]:
         yield made
 
 
-@contextmanager
+@contextlib.contextmanager
 def session(place: Fort, name: str | None) -> Iterator[zenoh.Session]:
     opened = open_session(place.at(name))
     try:
@@ -74,6 +74,32 @@ def answers(opened: zenoh.Session, key: str, payload: dict[str, Any]) -> list[st
         bytes(r.ok.payload).decode() if r.ok else r.err.payload.to_string()  # type: ignore[union-attr]
         for r in replies
     ]
+
+
+def test_each_role_can_do_its_own_work(place: Fort, tmp_path: Path) -> None:
+    """The commands as a site uses them, side by side; only then do the refusals below mean much."""
+    day = tmp_path / "day.mcap"
+    scene = ROOT / "config" / "scenes" / "bench.yaml"
+    works: dict[str, tuple[str | Path, ...]] = {
+        "record": ("record", place.site("recorder"), day, "--for", "1.5"),
+        "watch": ("watch", place.site("viewer"), "--json"),
+        "ack": ("ack", place.site("operator"), "no-such-alert", "--who", "anna"),
+        "show": ("scene", "show", place.site("viewer")),
+        "put": ("scene", "put", place.site("engineer"), scene, "--who", "eve"),
+    }
+    with contextlib.ExitStack() as stack:
+        started = {
+            name: stack.enter_context(Process(tmp_path, name, ["-m", "rampe_guard", *words]))
+            for name, words in works.items()
+        }
+        place.ears.wait("recorder", lambda b: b["messages"] > 0, 60.0, 0.0)
+        started["watch"].wait_for('"machine"', 60.0)
+        for name, code in (("record", 0), ("ack", 2), ("show", 0), ("put", 0)):
+            assert started[name].popen.wait(60.0) == code, started[name].err
+        assert "'no-such-alert'" in started["ack"].err
+        assert "objects" in started["show"].out
+        assert "unavailable" not in started["watch"].out
+    assert day.stat().st_size > 10_000
 
 
 @pytest.mark.parametrize("who", ["nobody", "expired", "of another site"])
@@ -276,7 +302,7 @@ def test_a_client_s_certificate_does_not_make_a_router(place: Fort, tmp_path: Pa
 
 
 def test_who_s_certificate_ends_is_cut_off(place: Fort) -> None:
-    place.pki.issue_for("soon", 4.0)
+    place.pki.issue_for("soon", 3.0)
     with session(place, "soon") as viewer:
         (state,) = viewer.get(f"{BASE}/state", timeout=2.0)
         assert state.ok is not None

@@ -57,6 +57,10 @@ class Fort:
         """The router's endpoint for the bearer of a certificate."""
         return self.pki.at(self.endpoint, name)
 
+    def site(self, name: str) -> Path:
+        """The machine's site file for the bearer of a certificate."""
+        return _site(self.folder, self.endpoint, name)
+
     def logged(self, *words: str, within_s: float = 5.0) -> None:
         """Wait for a line in the router's log that has all of these words."""
 
@@ -95,6 +99,13 @@ def secure_router(folder: Path, config: Path) -> Process:
     return process
 
 
+def _site(folder: Path, endpoint: str, name: str) -> Path:
+    files = {"root_ca": "ca.crt", "certificate": "tls.crt", "key": "tls.key"}
+    tls = ", ".join(f"{key}: pki/{name}/{file}" for key, file in files.items())
+    secure = endpoint.replace("tcp/", "tls/")
+    return bench_copy(folder, f"zenoh: {{connect: [{secure}], tls: {{{tls}}}}}", name=name)
+
+
 @contextlib.contextmanager
 def fort(folder: Path) -> Iterator[Fort]:
     """Build it; end all."""
@@ -106,14 +117,10 @@ def fort(folder: Path) -> Iterator[Fort]:
     pki.issue_for("old", -60.0)
     pki.issue("stranger")
     endpoint = processes.free_endpoint()
-    secure = endpoint.replace("tcp/", "tls/")
-    files = {"root_ca": "ca.crt", "certificate": "tls.crt", "key": "tls.key"}
-    tls = ", ".join(f"{key}: pki/guard/{file}" for key, file in files.items())
-    site = bench_copy(folder, f"zenoh: {{connect: [{secure}], tls: {{{tls}}}}}")
     with contextlib.ExitStack() as stack:
         router = stack.enter_context(secure_router(folder, write_access(folder, pki, endpoint)))
         ears = stack.enter_context(Ears(pki.at(endpoint, "viewer"), BASE))
-        args = ["-m", "rampe_guard", "run", str(site)]
+        args = ["-m", "rampe_guard", "run", str(_site(folder, endpoint, "guard"))]
         guard = stack.enter_context(Process(folder, "guard", args))
         guard.wait_for("guarding on")
         yield Fort(folder, pki, endpoint, router, guard, ears)
