@@ -204,7 +204,7 @@ class Desk:
         self._key = key
         self._queryable = session.declare_queryable(key, zenoh.handlers.RingChannel(256))
 
-    def drain(self, most: int = 16) -> list[Request]:
+    def drain(self, most: int = 4) -> list[Request]:
         """The oldest requests that wait, ``most`` at once: however many ask, the worker goes on."""
         requests: list[Request] = []
         while len(requests) < most and (query := self._queryable.try_recv()) is not None:

@@ -221,7 +221,8 @@ def test_a_folder_that_cannot_be_written_degrades_and_is_told(workplace: Workpla
         beat = workplace.ears.wait(
             "heartbeat", lambda b: b["status"] == "degraded", 10.0, beat.at_s
         )
-        (reason,) = beat.body["reasons"]
+        reason, alerts = beat.body["reasons"]
+        assert alerts["code"] == "alerts_not_kept"
         assert reason["code"] == "model_not_kept"
         assert "Not a directory" in reason["text"]
         workplace.swing(1)
