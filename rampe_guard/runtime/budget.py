@@ -10,8 +10,8 @@ from __future__ import annotations
 BURST_S = 0.25
 """Messages of so long may come at once: a network that stood still delivers them together."""
 FEW = 8
-"""Of a flood no more are looked at in one turn: nothing is learned meanwhile, and a worker that gets
-little of a busy computer must not spend it on them."""
+"""Of a flood no more are looked at in one turn: nothing is learned meanwhile, and a worker that
+gets little of a busy computer must not spend it on them."""
 FLOOD_S = 1.0
 """After the last loss it is a flood for so long."""
 _LEAST = 16
