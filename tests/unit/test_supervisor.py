@@ -15,7 +15,7 @@ SUPERVISE = """
 import signal, sys
 from rampe_guard.runtime.supervisor import Supervisor
 command = [sys.executable, "-c", sys.argv[1], *sys.argv[2:]]
-sys.exit(Supervisor(command, first_delay_s=0.05, longest_delay_s=0.15, look_s=0.05).run())
+sys.exit(Supervisor(command, first_delay_s=0.05, longest_delay_s=0.15, look_s=0.1).run())
 """
 COUNT = """
 import os, pathlib, signal, sys, time
@@ -112,12 +112,12 @@ sys.exit(2)
 
 def test_neither_loading_nor_saving_is_a_hang(tmp_path: Path) -> None:
     guard = f"""{HANG}
-time.sleep(1.0)  # loads, twice as long as a hang
+time.sleep(1.5)  # loads, longer than a hang
 for turn in range(20):
     turning.feed(float(turn))
     time.sleep(0.05)
 turning.end()
-time.sleep(1.0)  # saves
+time.sleep(1.5)  # saves
 sys.exit(0)
 """
     with supervise(tmp_path, guard) as parent:
