@@ -22,7 +22,7 @@ from rampe_guard.settings import ZenohSettings, load_site
 from tests.support.ears import open_session
 from tests.support.fort import BASE, MACHINE, Fort, fort, secure_router
 from tests.support.pki import HAVE_OPENSSL, Pki
-from tests.support.processes import BENCH, ROOT, Process, free_endpoint, until
+from tests.support.processes import BENCH, ROOT, Process, called, free_endpoint, until
 from tests.support.rig import Rig
 from tests.support.station import REST
 
@@ -80,25 +80,30 @@ def test_each_role_can_do_its_own_work(place: Fort, tmp_path: Path) -> None:
     """The commands as a site uses them, side by side; only then do the refusals below mean much."""
     day = tmp_path / "day.mcap"
     scene = ROOT / "config" / "scenes" / "bench.yaml"
-    works: dict[str, tuple[str | Path, ...]] = {
-        "record": ("record", place.site("recorder"), day, "--for", "1.5"),
-        "watch": ("watch", place.site("viewer"), "--json"),
-        "ack": ("ack", place.site("operator"), "no-such-alert", "--who", "anna"),
-        "show": ("scene", "show", place.site("viewer")),
-        "put": ("scene", "put", place.site("engineer"), scene, "--who", "eve"),
-    }
-    with contextlib.ExitStack() as stack:
-        started = {
-            name: stack.enter_context(Process(tmp_path, name, ["-m", "rampe_guard", *words]))
-            for name, words in works.items()
-        }
+    record: list[str | Path] = [
+        "-m",
+        "rampe_guard",
+        "record",
+        place.site("recorder"),
+        day,
+        "--for",
+        "1.5",
+    ]
+    watch: list[str | Path] = ["-m", "rampe_guard", "watch", place.site("viewer"), "--json"]
+    with (
+        Process(tmp_path, "record", record) as recorder,
+        Process(tmp_path, "watch", watch) as watcher,
+    ):
+        asked = called("ack", place.site("operator"), "no-such-alert", "--who", "anna")
+        shown = called("scene", "show", place.site("viewer"))
+        put = called("scene", "put", place.site("engineer"), scene, "--who", "eve")
         place.ears.wait("recorder", lambda b: b["messages"] > 0, 60.0, 0.0)
-        started["watch"].wait_for('"machine"', 60.0)
-        for name, code in (("record", 0), ("ack", 2), ("show", 0), ("put", 0)):
-            assert started[name].popen.wait(60.0) == code, started[name].err
-        assert "'no-such-alert'" in started["ack"].err
-        assert "objects" in started["show"].out
-        assert "unavailable" not in started["watch"].out
+        watcher.wait_for('"machine"', 60.0)
+        assert recorder.popen.wait(60.0) == 0, recorder.err
+        assert "unavailable" not in watcher.out
+    assert (asked.returncode, "'no-such-alert'" in asked.stderr) == (2, True)
+    assert (shown.returncode, put.returncode) == (0, 0), shown.stderr + put.stderr
+    assert "objects" in shown.stdout
     assert day.stat().st_size > 10_000
 
 
