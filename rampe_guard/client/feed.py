@@ -11,7 +11,8 @@ from rampe_guard.client import fleet as core
 from rampe_guard.client.fleet import Fleet, Told
 from rampe_guard.client.items import Alert, Item
 from rampe_guard.errors import MessageError
-from rampe_guard.runtime.zenoh_io import Bus, Inquiry, check_key_expression, is_pattern
+from rampe_guard.runtime.zenoh_io import Bus, check_key_expression, is_pattern
+from rampe_guard.runtime.zenoh_queries import Inquiry
 
 _CAPACITY = 4096
 """Messages that may wait on one subscription."""

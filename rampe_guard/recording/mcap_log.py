@@ -22,7 +22,7 @@ from rampe_guard.recording.channels import Channel, understood
 from rampe_guard.recording.reader import McapReading
 from rampe_guard.runtime.batch import Batch
 from rampe_guard.runtime.replay import idle_times
-from rampe_guard.runtime.zenoh_io import Message
+from rampe_guard.runtime.zenoh_queries import Message
 from rampe_guard.settings import Site
 
 _INPUTS = ("joystick", "actuators", "object", "enabled", "joystick_alive")

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 from rampe_guard.recording.channels import Channel
 from rampe_guard.recording.writer import Entry
-from rampe_guard.runtime.zenoh_io import Bus, Inbox, Message
+from rampe_guard.runtime.zenoh_io import Bus, Inbox
+from rampe_guard.runtime.zenoh_queries import Message
 
 _CAPACITY = 8192
 """Messages that may wait on one subscription: many seconds of any of them."""

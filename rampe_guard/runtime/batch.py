@@ -22,7 +22,7 @@ from rampe_guard.core.types import (
     ObjectSample,
 )
 from rampe_guard.errors import MessageError
-from rampe_guard.runtime.zenoh_io import Message
+from rampe_guard.runtime.zenoh_queries import Message
 from rampe_guard.settings import Site
 
 Refused = Callable[[str, Message, MessageError], None]

@@ -15,7 +15,8 @@ from rampe_guard.errors import MessageError
 from rampe_guard.runtime.batch import Batch
 from rampe_guard.runtime.budget import Budget
 from rampe_guard.runtime.say import Sayer
-from rampe_guard.runtime.zenoh_io import Bus, Message
+from rampe_guard.runtime.zenoh_io import Bus
+from rampe_guard.runtime.zenoh_queries import Message
 from rampe_guard.settings import Site
 
 

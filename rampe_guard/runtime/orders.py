@@ -14,7 +14,8 @@ from rampe_guard.core.events import AlertEvent
 from rampe_guard.core.guard import Guard
 from rampe_guard.errors import MessageError, RefusedError
 from rampe_guard.runtime.audit import Audit
-from rampe_guard.runtime.zenoh_io import Bus, Request
+from rampe_guard.runtime.zenoh_io import Bus
+from rampe_guard.runtime.zenoh_queries import Request
 from rampe_guard.settings import Site
 
 W = TypeVar("W", wire.Ack, wire.Shelve, wire.Forget)

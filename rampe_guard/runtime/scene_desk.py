@@ -13,7 +13,8 @@ from rampe_guard.errors import MessageError, RampeGuardError, RefusedError
 from rampe_guard.runtime.audit import Audit
 from rampe_guard.runtime.scene_builder import Built, SceneBuilder
 from rampe_guard.runtime.scene_kept import SceneKeeper, SceneText
-from rampe_guard.runtime.zenoh_io import Bus, Request
+from rampe_guard.runtime.zenoh_io import Bus
+from rampe_guard.runtime.zenoh_queries import Request
 from rampe_guard.settings import Site
 
 COMMAND: Final = "scene/put"

@@ -1,4 +1,4 @@
-"""The only importer of zenoh: sessions, inboxes, publishers and queries in our own terms.
+"""Zenoh in our own terms: sessions, inboxes, publishers. Only the zenoh_ modules here import it.
 
 Nothing is ever computed in a Zenoh callback. Every subscriber and queryable fills a ring
 channel, which drops its oldest message when full and so cannot stall the session; whoever
@@ -11,7 +11,6 @@ import contextlib
 import json
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Self, TypeVar
 
@@ -20,6 +19,7 @@ import zenoh
 from rampe_guard.errors import ConnectionFailedError, MessageError, SettingsError
 from rampe_guard.runtime import zenoh_rules
 from rampe_guard.runtime.zenoh_config import blank, parts
+from rampe_guard.runtime.zenoh_queries import Desk, Inquiry, Message
 from rampe_guard.settings import ZenohSettings
 from rampe_guard.settings.network import redacted, shown
 
@@ -29,14 +29,6 @@ _CHANGES = 16
 """Comings and goings of a token that wait, and that are looked at once."""
 _TOKEN_GRACE_S = 1.0
 """Existing tokens are told of within milliseconds after the subscription."""
-
-
-@dataclass(frozen=True, slots=True)
-class Message:
-    """A payload as it came, with the exact key that it was put on."""
-
-    key: str
-    payload: bytes
 
 
 class Inbox:
@@ -114,34 +106,6 @@ class Tokens:
         return changes
 
 
-class Inquiry:
-    """A question to everyone whose queryable matches a key expression, answered bit by bit."""
-
-    def __init__(self, session: zenoh.Session, key: str, timeout_s: float) -> None:
-        # no ring: that forgets what waits in it as soon as the last answer has come
-        self._replies = session.get(
-            key,
-            zenoh.handlers.FifoChannel(4096),
-            target=zenoh.QueryTarget.ALL,
-            consolidation=zenoh.ConsolidationMode.NONE,
-            timeout=timeout_s,
-        )
-        self.done = False
-        """All have answered, or the time is over."""
-
-    def drain(self) -> list[Message]:
-        """Answers that arrived since the last look; errors are left out; never blocks."""
-        answers = []
-        try:
-            while (reply := self._replies.try_recv()) is not None:
-                if reply.ok is not None:
-                    key = str(reply.ok.key_expr)
-                    answers.append(Message(key, reply.ok.payload.to_bytes()))
-        except zenoh.ZError:  # the channel is empty, and closed
-            self.done = True
-        return answers
-
-
 class Outbox:
     """A publisher on one key; ``put`` never waits for a slow subscriber."""
 
@@ -165,52 +129,6 @@ class Outbox:
     def heard(self) -> bool:
         """At least one subscriber matches now."""
         return bool(self._publisher.matching_status)
-
-
-@dataclass(frozen=True, slots=True)
-class Request:
-    """A query that waits for an answer."""
-
-    key: str
-    payload: bytes | None
-    _query: Any
-
-    def check_exact(self) -> None:
-        """See whether it was asked of this key alone, and not of all that a pattern matches.
-
-        Raises:
-            MessageError: ``wildcard_key``.
-        """
-        if (asked := str(self._query.key_expr)) != self.key:
-            raise MessageError("wildcard_key", f"asked on {asked!r}, expected {self.key!r}")
-
-    def reply(self, payload: bytes) -> None:
-        """Answer it."""
-        with contextlib.suppress(zenoh.ZError):  # whoever asked may be gone
-            self._query.reply(self.key, payload, encoding=zenoh.Encoding.APPLICATION_JSON)
-        self._query.drop()
-
-    def refuse(self, text: str) -> None:
-        """Answer with an error."""
-        with contextlib.suppress(zenoh.ZError):
-            self._query.reply_err(text.encode(), encoding=zenoh.Encoding.TEXT_PLAIN)
-        self._query.drop()
-
-
-class Desk:
-    """A queryable on one key, drained by its owner."""
-
-    def __init__(self, session: zenoh.Session, key: str) -> None:
-        self._key = key
-        self._queryable = session.declare_queryable(key, zenoh.handlers.RingChannel(256))
-
-    def drain(self, most: int = 4) -> list[Request]:
-        """The oldest requests that wait, ``most`` at once: however many ask, the worker goes on."""
-        requests: list[Request] = []
-        while len(requests) < most and (query := self._queryable.try_recv()) is not None:
-            payload = None if query.payload is None else query.payload.to_bytes()
-            requests.append(Request(self._key, payload, query))
-        return requests
 
 
 class Bus:

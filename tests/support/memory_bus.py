@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any, Self
 
-from rampe_guard.runtime.zenoh_io import Message, Request
+from rampe_guard.runtime.zenoh_queries import Message, Request
 
 
 class MemoryInbox:

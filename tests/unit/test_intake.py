@@ -15,7 +15,8 @@ from rampe_guard.core.types import EnabledSample, Inputs
 from rampe_guard.runtime.intake import Intake
 from rampe_guard.runtime.say import Sayer
 from rampe_guard.runtime.worker import arrived
-from rampe_guard.runtime.zenoh_io import Bus, Message
+from rampe_guard.runtime.zenoh_io import Bus
+from rampe_guard.runtime.zenoh_queries import Message
 from rampe_guard.settings import load_site
 
 SITE = """\
