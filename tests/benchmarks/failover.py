@@ -18,6 +18,7 @@ import time
 from pathlib import Path
 
 from tests.support.bench_site import bench_copy
+from tests.support.ends import end_on_signals
 from tests.support.faults import Fault, Outcome, suffer
 from tests.support.ground import Ground, proving_ground
 
@@ -48,6 +49,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--times", type=int, default=10)
     args = parser.parse_args()
+    end_on_signals()
     rng = random.Random(1)
     with tempfile.TemporaryDirectory(prefix="rampe-guard-") as name:
         folder = Path(name)

@@ -19,6 +19,7 @@ import tempfile
 from pathlib import Path
 
 from tests.support.bench_site import bench_copy
+from tests.support.ends import end_on_signals
 from tests.support.faults import FAULTS, Fault, Outcome, router_killed, suffer
 from tests.support.faults_inside import INSIDE, scenes_put
 from tests.support.ground import proving_ground
@@ -52,6 +53,7 @@ def main() -> int:
     parser.add_argument("--only", default="", help="faults with this word in their name")
     parser.add_argument("--seed", type=int, default=1)
     args = parser.parse_args()
+    end_on_signals()
     rng, broken = random.Random(args.seed), []
     rows = ["| fault | promise | measured |", "|---|---|---|"]
     with contextlib.ExitStack() as stack:

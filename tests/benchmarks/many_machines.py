@@ -32,6 +32,7 @@ from rich.table import Table
 from tests.support import processes
 from tests.support.bench_site import bench_copy
 from tests.support.ears import open_session
+from tests.support.ends import end_on_signals
 from tests.support.gauges import Cost, cost
 from tests.support.processes import Process
 
@@ -164,6 +165,7 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--rates", type=float, nargs="+", default=[5.0, 15.0])
     args = parser.parse_args()
+    end_on_signals()
     with contextlib.ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="rampe-guard-")))
         names = [f"machine-{n}" for n in range(args.machines)]

@@ -21,7 +21,6 @@ import contextlib
 import json
 import os
 import random
-import signal
 import statistics
 import sys
 import tempfile
@@ -36,6 +35,7 @@ from rich.console import Console
 from rich.table import Table
 
 from tests.support.bench_site import bench_copy
+from tests.support.ends import end_on_signals
 from tests.support.faults import FAULTS, Fault, Outcome, suffer
 from tests.support.gauges import cost
 from tests.support.ground import Ground, proving_ground
@@ -263,7 +263,7 @@ def main() -> int:
     parser.add_argument("--keep", type=Path, help="a folder for the logs of all processes")
     args = parser.parse_args()
     seconds = args.hours * 3600.0 if args.minutes is None else args.minutes * 60.0
-    signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
+    end_on_signals()
     with contextlib.ExitStack() as stack:
         folder = args.keep or Path(
             stack.enter_context(tempfile.TemporaryDirectory(prefix="rampe-guard-"))

@@ -26,7 +26,7 @@ def test_spoilt_messages_neither_stop_a_guard_nor_clear_its_alert(
 def test_spoilt_files_are_refused_with_words(tmp_path: Path) -> None:
     kernel_cache.choose_folder()
     found = Files()
-    fuzz_files(tmp_path / "files", 1, 0, depth(16, 2_000), found)
+    fuzz_files(tmp_path / "files", 1, 0, depth(10, 2_000), found)
     assert found.wrong == []
-    assert found.outcomes.total() == depth(16, 2_000)
+    assert found.outcomes.total() == depth(10, 2_000)
     assert {outcome for _, outcome in found.outcomes} <= {"ok", "refused"}
