@@ -6,6 +6,6 @@ import signal
 
 
 def end_on_signals() -> None:
-    """SIGINT and SIGTERM raise KeyboardInterrupt; a shell's ``&`` would have them ignore the first."""
+    """Both raise KeyboardInterrupt; what a shell starts with ``&`` would ignore SIGINT."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
