@@ -33,9 +33,17 @@ def full_disk(pid: int) -> Iterator[None]:
 
 
 def disk_full(ground: Ground, _: random.Random, seconds: float) -> float:
-    """The guard cannot write what it learns, its marks, or its log."""
+    """The guard cannot write what it learns, its marks, or its log; it must say so."""
+
+    def told() -> bool:
+        reasons = ground.witness.beats.newest["reasons"]
+        return any(reason["code"] == "model_not_kept" for reason in reasons)
+
     with full_disk(ground.worker):
-        ground.pause(seconds)
+        ground.pause(seconds / 2)
+        ground.tell(task="work")  # there is something to learn, and to save
+        ground.wait(told, 60.0, "model_not_kept")
+        ground.pause(seconds / 2)
     return time.monotonic()
 
 
@@ -48,6 +56,7 @@ def recorder_disk_full(ground: Ground, _: random.Random, seconds: float) -> floa
         ground.wait(
             lambda: any(f.stat().st_size for f in folder.glob("*.mcap")), 60.0, "a recording"
         )
+        ground.pause(3.0)  # some of it is on the disk
         with full_disk(recorder.pid):
             ground.pause(seconds)
         over_s = time.monotonic()
