@@ -29,7 +29,6 @@ BRIEF = {
     "messages out of order": 0.5,
     "stamps jump by an hour and back": 1.2,
     "subscriber wedged": 0.5,
-    "disk full under the guard": 1.5,
     "wall clock set by an hour": 0.5,
 }
 """Those that every change goes through, and for how long [s]; nightly, all of them in full."""
