@@ -1,7 +1,8 @@
 """Is the machine switched off? What its enable key says, held against what the machine does.
 
-Only a fresh, explicit "off" counts. No message, an old one or a refused one reads as on: then
-the guard watches, and says what is wrong with the key. Signs of life are a lever that is pushed
+Only a fresh, explicit "off" counts. No message, an old one, a refused one or one that is stamped
+ahead of the machine's clock (nobody knows how old it is) reads as on: then the guard watches, and
+says what is wrong with the key. Signs of life are a lever that is pushed
 and an actuator that moves. While they last, the machine is not off, whatever it says:
 
 - for a second after the word they are the end of the work (an arm that runs out), and the guard
@@ -54,6 +55,7 @@ class EnableKey:
         self._start_s = start_s
         self._word: EnabledSample | None = None
         self._said_s = _NEVER
+        self._early_s: float | None = None
         self._off_since_s: float | None = None
         self._anchor: tuple[float, FloatArray] | None = None
         self._life_s = _NEVER
@@ -67,9 +69,10 @@ class EnableKey:
         if isinstance(verdict, Fault):
             self.refused()
             return verdict
-        self._word, self._said_s = sample, sample.arrival_s
+        self._word, self._said_s, self._early_s = sample, sample.arrival_s, None
         if sample.stamped and not sample.enabled:
             self._said_s = self._clock.measured_s(sample.stamp_s, sample.arrival_s)
+            self._early_s = self._clock.early_s(sample.stamp_s, sample.arrival_s)
         return verdict
 
     def refused(self) -> None:
@@ -81,7 +84,7 @@ class EnableKey:
         if restarted:
             self._clock.restart()
             self._anchor = None
-        self._clock.follow(sample.stamp_s, sample.arrival_s)
+        self._clock.follow(sample.stamp_s, sample.arrival_s, stamped=sample.stamped)
         now_s, q = sample.arrival_s, sample.position
         if self._anchor is None:
             self._anchor = (now_s, q)
@@ -123,6 +126,12 @@ class EnableKey:
             text += " by the stamps of the actuators" if late else ""
             text += ": taken as on"
             found.append(Reason("enabled_silent", "enabled", text))
+        elif self._word is not None and self._early_s is not None:
+            text = (
+                f"the enabled messages are {self._early_s:.1f} s ahead of the actuators by their"
+                " stamps: taken as on; do both come from one clock?"
+            )
+            found.append(Reason("enabled_early", "enabled", text))
         if self._contradicted_s is not None and now_s - self._contradicted_s < RECENT_S:
             text = "the machine says that it is off, and moves or is steered: taken as on"
             found.append(Reason("enabled_contradicted", "enabled", text))
@@ -131,4 +140,4 @@ class EnableKey:
     def _says_off(self, now_s: float) -> bool:
         if self._word is None or self._word.enabled or self._timeout_s is None:
             return False
-        return now_s - self._said_s <= self._timeout_s
+        return self._early_s is None and now_s - self._said_s <= self._timeout_s

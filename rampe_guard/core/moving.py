@@ -7,8 +7,9 @@ Each has a key on which its pose comes. At any time every point of it lies withi
 of where that pose puts it, if no point of it is faster than ``max_speed`` and the pose was
 measured when its stamp says. The first is checked by the way from pose to pose, the second
 against the machine's own stamps; either breach degrades the status by name. Before the first
-pose, and once the newest is older than the object's time-out, its placement is None: the sweep
-answers "unknown", which the alarm logic takes as contact.
+pose, once the newest is older than the object's time-out, and while it is stamped ahead of the
+machine's clock (its age cannot be known then), its placement is None: the sweep answers "unknown",
+which the alarm logic takes as contact.
 """
 
 from __future__ import annotations
@@ -49,6 +50,7 @@ class MovingObject:
         self._gate = Continuity[ObjectSample](item.timeout_s, config.max_stamp_jump_s)
         self._newest: ObjectSample | None = None
         self._measured_s = 0.0
+        self._early_s: float | None = None
         self._anchor: FloatArray | None = None
         self._moved_s = 0.0
         self._accepted = 0
@@ -70,9 +72,10 @@ class MovingObject:
         if self._newest is not None and not verdict.restarted:
             self._check_speed(self._newest, sample)
         self._newest = sample
-        self._measured_s = sample.arrival_s
+        self._measured_s, self._early_s = sample.arrival_s, None
         if sample.stamped:
             self._measured_s = clock.measured_s(sample.stamp_s, sample.arrival_s)
+            self._early_s = clock.early_s(sample.stamp_s, sample.arrival_s)
         self._accepted += 1
         if self._anchor is None or self._left(self._anchor, sample.pose):
             self._anchor, self._moved_s = sample.pose, sample.arrival_s
@@ -88,12 +91,15 @@ class MovingObject:
         age_s = self._age_s(now_s)
         if self._newest is None or age_s is None or age_s > self._timeout_s:
             return None
+        if self._early_s is not None:
+            return None
         return Placement(self._newest.pose, self._max_speed * age_s)
 
     def restless(self, now_s: float) -> bool:
         """It moved of late, or has not been seen standing: it may be coming nearer."""
         age_s = self._age_s(now_s)
-        return age_s is None or age_s > _SEEN_S or now_s - self._moved_s < _SETTLED_S
+        unseen = age_s is None or age_s > _SEEN_S or self._early_s is not None
+        return unseen or now_s - self._moved_s < _SETTLED_S
 
     def health(self, now_s: float) -> ObjectHealth:
         """Age and counts, for the heartbeat."""
@@ -130,11 +136,14 @@ class MovingObject:
             text = f"no good pose of {where} yet: taken as contact"
         elif now_s - newest.arrival_s <= self._timeout_s:
             late_s = newest.arrival_s - self._measured_s
+            code, differ = "object_late", f"{late_s:.1f} s behind"
+            if self._early_s is not None:
+                code, differ = "object_early", f"{self._early_s:.1f} s ahead of"
             text = (
-                f"the poses of {where} are {late_s:.1f} s behind the actuators by their stamps:"
+                f"the poses of {where} are {differ} the actuators by their stamps:"
                 " taken as contact; do both come from one clock?"
             )
-            return Reason("object_late", None, text, self.key)
+            return Reason(code, None, text, self.key)
         else:
             limit = f"{self._timeout_s:g} s"
             text = f"no good pose of {where} for more than {limit}: taken as contact"
@@ -184,7 +193,7 @@ class MovingObjects:
         """Take an accepted position of the machine: its stamp tells how the clocks differ."""
         if restarted:
             self._clock.restart()
-        self._clock.follow(sample.stamp_s, sample.arrival_s)
+        self._clock.follow(sample.stamp_s, sample.arrival_s, stamped=sample.stamped)
 
     def take(self, inputs: Inputs, now_s: float) -> tuple[bool, list[RefusalEvent]]:
         """Take what arrived, in order; whether a pose is new, and what was refused.

@@ -3,7 +3,8 @@
 All senders stamp with one clock, whose distance from ours nobody knows. The machine's positions
 show it: the freshest of them is not older than it looks. A message whose stamp lags behind
 that clock is as old as its stamp says, however late it came; one that does not lag is as old as
-its arrival says.
+its arrival says. One that is stamped well ahead of that clock was stamped by another one: how long
+it was under way, nobody can tell.
 """
 
 from __future__ import annotations
@@ -11,6 +12,9 @@ from __future__ import annotations
 _DRIFT = 1e-3
 """How much the distance may shrink by [s/s]: clocks run apart by far less, and one position
 that came without delay is not held against the later ones for ever."""
+_SPREAD_S = 0.3
+"""What comes on a shorter way than the machine's positions looks that much ahead of them: ways that
+differ by more are not to be told from clocks that differ [s]."""
 
 
 class SenderClock:
@@ -20,8 +24,10 @@ class SenderClock:
         self._ahead_s: float | None = None
         self._at_s = 0.0
 
-    def follow(self, stamp_s: float, arrival_s: float) -> None:
-        """Take an accepted message of the machine."""
+    def follow(self, stamp_s: float, arrival_s: float, *, stamped: bool = True) -> None:
+        """Take an accepted message of the machine; without a stamp of its own it tells nothing."""
+        if not stamped:
+            return
         ahead_s = stamp_s - arrival_s
         if self._ahead_s is not None:
             ahead_s = max(ahead_s, self._ahead_s - _DRIFT * (arrival_s - self._at_s))
@@ -36,3 +42,12 @@ class SenderClock:
         if self._ahead_s is None:
             return arrival_s
         return min(arrival_s, stamp_s - self._ahead_s)
+
+    def early_s(self, stamp_s: float, arrival_s: float) -> float | None:
+        """How far a stamp is ahead of the machine's [s], if further than one clock allows."""
+        if self._ahead_s is None:
+            return None
+        early_s = stamp_s - arrival_s - self._ahead_s
+        # while the machine is silent its clock runs on, and may run away from ours
+        allowed_s = _SPREAD_S + _DRIFT * max(arrival_s - self._at_s, 0.0)
+        return early_s if early_s > allowed_s else None

@@ -197,6 +197,25 @@ def test_a_word_that_lags_behind_the_machine_by_its_stamp_is_old() -> None:
     assert status(rig) is Status.DEGRADED
 
 
+@pytest.mark.parametrize("ahead_s", [0.2, 3600.0])
+def test_a_word_from_the_future_reads_as_on(ahead_s: float) -> None:
+    rig = CoreRig(config=KEYED)
+    rig.hold(0.0, 3.0)
+    for _ in range(40):  # whose clock goes on like that
+        word = EnabledSample(enabled=False, stamp_s=rig.now + ahead_s, arrival_s=rig.now)
+        rig.guard.step(Inputs(enabled=(word,)), rig.now)
+        rig.tick(0.0)
+    if ahead_s < 1.0:  # jitter
+        assert codes(rig) == ["machine_off"]
+        return
+    (reason,) = rig.guard.snapshot(rig.now).health.reasons
+    assert (reason.code, reason.input) == ("enabled_early", "enabled")
+    assert "are 3600.0 s ahead of the actuators by their stamps: taken as on" in reason.text
+    assert status(rig) is Status.DEGRADED
+    rig.guard.step(Inputs(enabled=(replace(word, enabled=True),)), rig.now)
+    assert codes(rig) == []
+
+
 def test_a_key_that_never_speaks_is_told_and_reads_as_on() -> None:
     rig = CoreRig(config=KEYED)
     rig.hold(0.0, ENABLED_S + 0.5)

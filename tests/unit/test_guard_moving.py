@@ -193,6 +193,19 @@ def test_silence_grows_the_truck_then_makes_it_unknown() -> None:
     assert yard.codes() == []
 
 
+def test_a_truck_whose_clock_is_an_hour_ahead_is_never_clear() -> None:
+    yard = Yard()
+    yard.hold(1.0, x=50.0)
+    for _ in range(200):
+        yard.tick()
+        ahead = seen(50.0, yard.now + 3600.0, yard.now)
+        yard.events += yard.guard.step(Inputs(objects=(ahead,)), yard.now)
+    assert [e.level for e in yard.transitions()] == [Level.IMMINENT]
+    health = yard.guard.snapshot(yard.now).health
+    assert health.status is Status.DEGRADED
+    assert [r.code for r in health.reasons] == ["object_early", "object_stamp_jump"]
+
+
 def test_a_truck_that_dies_far_away_is_never_clear() -> None:
     yard = Yard()
     yard.hold(1.0, x=50.0)

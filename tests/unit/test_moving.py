@@ -146,6 +146,55 @@ def test_stamps_of_another_clock_are_told() -> None:
     assert codes(moving, 11.5) == ["object_silent"]
 
 
+def test_a_pose_that_is_a_little_newer_than_the_newest_position_is_fresh() -> None:
+    moving = objects()
+    moving.follow(arm(AHEAD_S + 10.0, 10.1), restarted=False)
+    for k, early_s in enumerate((0.0, 0.1, 0.29)):  # shorter ways than the actuators' own
+        now_s = 10.0 + k
+        take(moving, seen(0.0, AHEAD_S + now_s - 0.1 + early_s, now_s))
+        assert placed(moving, now_s).grown_m == 0.0
+        assert codes(moving, now_s) == []
+
+
+def test_a_clock_that_is_ahead_is_told_and_places_nothing() -> None:
+    moving = objects()
+    moving.follow(arm(AHEAD_S + 10.0, 10.0), restarted=False)
+    take(moving, seen(8.0, AHEAD_S + 9.9, 10.0))
+    reasons = []
+    for k in range(1, 30):  # an hour ahead, and steadily so
+        now_s = 10.0 + 0.1 * k
+        moving.follow(arm(AHEAD_S + now_s, now_s), restarted=False)
+        reasons += take(moving, seen(8.0, AHEAD_S + now_s + 3600.0, now_s))
+    assert set(reasons) == {"stamp_jump"}  # for as long as its time-out, then it is taken...
+    assert moving.health(now_s)[0].accepted > 10
+    assert moving.placements(now_s) == {"truck": None}  # ...and believed in nothing
+    assert moving.health(now_s)[0].grown_m is None
+    assert moving.restless("truck", now_s)
+    reason = moving.weaknesses(now_s)[0]
+    assert (reason.code, reason.key) == ("object_early", "site/truck/pose")
+    assert "are 3600.0 s ahead of the actuators by their stamps" in reason.text
+    assert "do both come from one clock?" in reason.text
+    assert "object_silent" in codes(moving, now_s + 1.01)
+
+
+def test_the_first_pose_of_all_may_not_come_from_the_future_either() -> None:
+    moving = objects()
+    moving.follow(arm(AHEAD_S + 10.0, 10.0), restarted=False)
+    assert take(moving, seen(8.0, AHEAD_S + 10.4, 10.0)) == []
+    assert moving.placements(10.0) == {"truck": None}
+    assert codes(moving, 10.0) == ["object_early"]
+    take(moving, seen(8.0, AHEAD_S + 10.5, 10.5))
+    assert placed(moving, 10.5).grown_m == 0.0
+
+
+def test_a_machine_that_fell_silent_is_no_exact_clock() -> None:
+    clock = SenderClock()
+    clock.follow(AHEAD_S + 10.0, 10.0)
+    assert clock.early_s(AHEAD_S + 10.31, 10.0) == pytest.approx(0.31)
+    assert clock.early_s(AHEAD_S + 1010.31, 1010.0) is None  # 0.3 s after 17 minutes
+    assert clock.early_s(AHEAD_S + 1011.5, 1010.0) == pytest.approx(1.5)
+
+
 def test_without_a_stamp_the_arrival_counts() -> None:
     moving = objects()
     moving.follow(arm(AHEAD_S + 10.0, 10.0), restarted=False)
@@ -155,7 +204,7 @@ def test_without_a_stamp_the_arrival_counts() -> None:
 
 def test_a_machine_without_stamps_leaves_the_arrival_to_count() -> None:
     moving = objects()
-    moving.follow(arm(10.0, 10.0), restarted=False)
+    moving.follow(replace(arm(10.0, 10.0), stamped=False), restarted=False)
     take(moving, seen(0.0, AHEAD_S, 10.0))
     assert placed(moving, 10.2).grown_m == pytest.approx(0.4)
 
