@@ -22,5 +22,13 @@ def give(bus: Bus, base: str, order: Order, timeout_s: float = 2.0) -> bytes:
     key = f"{base}/{_WORDS[type(order)]}"
     answers = bus.ask(key, wire.encode(order), timeout_s)
     if not answers:
-        raise ConnectionFailedError(f"no guard answers on {key}")
+        raise ConnectionFailedError(unanswered(key))
     return answers[0]
+
+
+def unanswered(key: str) -> str:
+    """What may be the matter when nobody answers: a router that refuses does it silently."""
+    return (
+        f"no answer on {key}: no guard is there, or this certificate may not ask, or the way to it"
+        " was lost; whether it was done is not known"
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import getpass
 import sys
 import time
@@ -9,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rampe_guard import wire
+from rampe_guard.client.order import unanswered
 from rampe_guard.errors import ConnectionFailedError, MessageError, SettingsError
 from rampe_guard.runtime.connecting import connect_to
 from rampe_guard.runtime.zenoh_io import Bus
@@ -17,6 +19,8 @@ from rampe_guard.settings.source import read_bytes
 
 _PUT_S = 330.0
 """A mesh that must be wrapped takes a while."""
+_LOOK_S = 20.0
+_AT_ONCE_S = 0.5
 
 
 def show_scene(site_path: str, endpoints: Sequence[str]) -> int:
@@ -49,11 +53,39 @@ def put_scene(site_path: str, endpoints: Sequence[str], file: str, who: str | No
     except UnicodeDecodeError as error:
         raise SettingsError(f"{file}: not UTF-8: {error}") from None
     wish = wire.ScenePut(scene=text, who=who or getpass.getuser())
-    found = _asked(site, "scene/put", wire.encode(wish), _PUT_S)
+    began_s = time.monotonic()
+    try:
+        found = _asked(site, "scene/put", wire.encode(wish), _PUT_S)
+    except UnansweredError:
+        if time.monotonic() - began_s < _AT_ONCE_S:  # there was nobody to ask
+            raise
+        found = _in_force(site, wish)
     for note in found.notes:
         sys.stderr.write(f"{note}\n")
     sys.stdout.write(f"{_facts(found, site)}\n")
     return 0
+
+
+class UnansweredError(ConnectionFailedError):
+    """Nobody answered; whether it was done is not known."""
+
+
+def _in_force(site: Site, wish: wire.ScenePut) -> wire.SceneInForce:
+    """Look whether a scene is in force though the answer to its put was lost on the way.
+
+    Raises:
+        UnansweredError: it is not, or that cannot be seen.
+    """
+    key = f"{site.keys.base}/scene/put"
+    sys.stderr.write("the answer did not come; looking whether the scene is in force\n")
+    until_s = time.monotonic() + _LOOK_S
+    while time.monotonic() < until_s:
+        with contextlib.suppress(ConnectionFailedError):
+            found = _asked(site, "scene", None, 2.0)
+            if (found.scene, found.put_by) == (wish.scene, wish.who):
+                return found
+        time.sleep(1.0)
+    raise UnansweredError(f"{unanswered(key)}; `rampe-guard scene show` tells") from None
 
 
 def _asked(site: Site, word: str, payload: bytes | None, timeout_s: float) -> wire.SceneInForce:
@@ -61,7 +93,7 @@ def _asked(site: Site, word: str, payload: bytes | None, timeout_s: float) -> wi
     with Bus.open(site.zenoh) as bus:
         answers = bus.ask(key, payload, timeout_s)
     if not answers:
-        raise ConnectionFailedError(f"no guard answers on {key}")
+        raise UnansweredError(unanswered(key))
     try:
         return wire.decode(answers[0], wire.SceneInForce)
     except MessageError as error:

@@ -126,7 +126,7 @@ class Recorder:
         try:
             while batch := self._backlog.first():
                 if self._another():
-                    self._series.finish({"reason": "another scene"})
+                    self._series.begin_anew({"reason": "another scene"})
                 self._series.append(batch)
                 self._backlog.written(len(batch))
                 self._refused = None

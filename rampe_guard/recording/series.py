@@ -115,6 +115,22 @@ class Series:
         ):
             self.finish({"reason": "rotated"})
 
+    def begin_anew(self, words: Mapping[str, str]) -> None:
+        """The next message begins a file; one without any message is no file at all.
+
+        Raises:
+            OSError: see `finish`.
+        """
+        file = self._file
+        if file is None or self._in_file:
+            self.finish(words)
+            return
+        self._file = None
+        self.begun.pop()
+        with contextlib.suppress(OSError):
+            file.close()
+        file.path.unlink(missing_ok=True)
+
     def finish(self, words: Mapping[str, str]) -> None:
         """Close the open file, if there is one, with its index.
 

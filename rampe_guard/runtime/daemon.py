@@ -102,7 +102,7 @@ def _load(site: Site, say: Sayer) -> tuple[Machine, Canary, Scenes]:
     except GeometryError as error:
         if source.put_by is None:
             raise
-        source = keeper.give_up(error)
+        source = keeper.give_up(source.put_by, error)
         machine = load_telling(replace(site, scene=source.scene), say.info)
     for note in machine.sweeper.notes:
         say.info(note)

@@ -114,6 +114,7 @@ class Own:
     learned: wire.Learned | None = None
     save_failures: int | None = None
     router: bool | None = None
+    commands: wire.Commands | None = None
 
 
 _NOTHING = Own()
@@ -204,6 +205,7 @@ class Pulse:
             learned=knows.learned,
             save_failures=knows.save_failures,
             router=knows.router,
+            commands=knows.commands,
             resources=resources(),
             steps=sum(self.loop_ms.counts),
             loop_ms=self.loop_ms.quantiles(),

@@ -103,6 +103,7 @@ class Metrics(Collector):
         yield _histogram("sweep_seconds", "Sweeps of one forecast.", shown.sweep)
         yield from _memory(beat)
         yield from _canary(beat, age_s)
+        yield from _commands(beat)
 
 
 def _status(beat: wire.Heartbeat, age_s: float) -> Iterator[Metric]:
@@ -194,6 +195,19 @@ def _canary(beat: wire.Heartbeat, age_s: float) -> Iterator[Metric]:
         good = float(beat.canary.result == "ok")
         yield _gauge("canary_ok", "1 if this machine computes what is so.", good)
         yield _gauge("canary_age_seconds", "Age of the newest trial.", beat.canary.age_s + age_s)
+
+
+def _commands(beat: wire.Heartbeat) -> Iterator[Metric]:
+    if beat.commands is None:
+        return
+    family = CounterMetricFamily(
+        _name("commands"), "What people wanted since the boot.", labels=["command", "outcome"]
+    )
+    told = {"granted": beat.commands.granted, "refused": beat.commands.refused}
+    for outcome, counts in told.items():
+        for command, count in sorted(counts.items()):
+            family.add_metric([command, outcome], count)
+    yield family
 
 
 def _name(name: str) -> str:

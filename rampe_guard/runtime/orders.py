@@ -50,11 +50,15 @@ class Orders:
     def answer(self, now_s: float) -> None:
         """Answer what waits."""
         for request in self._desks["ack"].drain():
-            self._grant("ack", request, wire.Ack, lambda wish: self._acknowledge(wish, now_s))
+            self._grant(
+                "ack", request, wire.Ack, lambda wish: self._acknowledge(wish, now_s), now_s
+            )
         for request in self._desks["shelve"].drain():
-            self._grant("shelve", request, wire.Shelve, lambda wish: self._shelve(wish, now_s))
+            self._grant(
+                "shelve", request, wire.Shelve, lambda wish: self._shelve(wish, now_s), now_s
+            )
         for request in self._desks["forget"].drain():
-            self._grant("forget", request, wire.Forget, self._forget)
+            self._grant("forget", request, wire.Forget, self._forget, now_s)
 
     def _grant(
         self,
@@ -62,6 +66,7 @@ class Orders:
         request: Request,
         kind: type[W],
         do: Callable[[W], tuple[str, tuple[bytes, ...]]],
+        now_s: float,
     ) -> None:
         who = None
         try:
@@ -70,7 +75,7 @@ class Orders:
             who = wish.who
             what, answers = do(wish)
         except (MessageError, RefusedError) as error:
-            self._audit.refuse(command, who, str(error))
+            self._audit.refuse(command, who, str(error), now_s)
             request.refuse(str(error))
             return
         self._audit.grant(command, who, what)

@@ -62,9 +62,9 @@ class SceneDesk:
         problem = self._keeper.problem
         if problem is None:
             return ()
-        return (wire.Reason(code="scene_not_kept", text=problem, key=None),)
+        return (wire.Reason(code=self._keeper.code, text=problem, key=None),)
 
-    def answer(self) -> None:
+    def answer(self, now_s: float) -> None:
         """Answer what waits, and take a scene that is ready."""
         for request in self._reads.drain():
             if request.payload:
@@ -72,11 +72,11 @@ class SceneDesk:
             else:
                 request.reply(wire.encode(self._message(with_text=True)))
         for request in self._puts.drain():
-            self._take(request)
+            self._take(request, now_s)
         if self._builder.busy and (result := self._builder.take()) is not None:
-            self._finish(result)
+            self._finish(result, now_s)
 
-    def _take(self, request: Request) -> None:
+    def _take(self, request: Request, now_s: float) -> None:
         who = None
         try:
             request.check_exact()
@@ -84,18 +84,18 @@ class SceneDesk:
             who = wish.who
             self._builder.check_free()
         except (MessageError, RefusedError) as error:
-            self._audit.refuse(COMMAND, who, str(error))
+            self._audit.refuse(COMMAND, who, str(error), now_s)
             request.refuse(str(error))
             return
         self._waiting = request, wish.who
         self._builder.begin(wish.scene, wish.who, time.time(), self._in_force.sweeper)
 
-    def _finish(self, result: Built | RampeGuardError) -> None:
+    def _finish(self, result: Built | RampeGuardError, now_s: float) -> None:
         if self._waiting is None:
             raise RuntimeError("nobody has put what was built")
         (request, who), self._waiting = self._waiting, None
         if not isinstance(result, Built):
-            self._audit.refuse(COMMAND, who, str(result))
+            self._audit.refuse(COMMAND, who, str(result), now_s)
             request.refuse(str(result))
             return
         self._in_force = result

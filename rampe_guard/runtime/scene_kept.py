@@ -23,6 +23,10 @@ from rampe_guard.wire import MAX_SCENE_BYTES
 
 _NAME: Final = "scene.kept.json"
 _FORMAT: Final = "rampe.scene_kept.v1"
+NOT_KEPT: Final = "scene_not_kept"
+"""The scene that was put holds, and would be lost with the guard's process."""
+UNUSABLE: Final = "scene_put_unusable"
+"""The scene that was put does not hold any more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,13 +77,18 @@ class SceneKeeper:
         say: log.
 
     Attributes:
-        problem: why the scene in force is not the one that was put last; None if all is well.
+        problem: why the scene in force is not the one that was put last, or will not be after a
+            restart; None if all is well.
+        code: which of both.
+        lost: in few words, that the scene that was put does not hold; None if it does.
     """
 
     def __init__(self, site: Site, say: Sayer) -> None:
         self._site, self._say = site, say
         self._own_hash = site.scene.content_hash
         self.problem: str | None = None
+        self.code = NOT_KEPT
+        self.lost: str | None = None
 
     def recall(self) -> SceneText:
         """The scene that holds when a guard starts.
@@ -91,24 +100,33 @@ class SceneKeeper:
         self._own_hash = own.scene.content_hash
         if not self._site.memory.enabled:
             return own
+        who = "somebody"
         try:
             content = self._file().read()
             if content is None:
                 return own
             kept = _decode(content)
+            who = kept.who
             if kept.instead_of != self._own_hash:
-                self._say.info(f"the scene that {kept.who} put gives way to a newer scene file")
+                self._say.info(f"the scene that {who} put gives way to a newer scene file")
                 return own
             scene = read_scene(kept.text, self._site)
         except RampeGuardError as error:
-            return self.give_up(error)
-        self._say.info(f"the scene is the one that {kept.who} put", put_by=kept.who)
-        return SceneText(scene, kept.text, kept.who, kept.unix_s)
+            return self.give_up(who, error)
+        self._say.info(f"the scene is the one that {who} put", put_by=who)
+        return SceneText(scene, kept.text, who, kept.unix_s)
 
-    def give_up(self, error: RampeGuardError) -> SceneText:
-        """The site's own scene instead of one that cannot be used any more."""
-        self.problem = f"the scene that was put last cannot be used: {error}; put it again"
-        self._say.warn("scene", self.problem)
+    def give_up(self, who: str, error: RampeGuardError) -> SceneText:
+        """The site's own scene instead of one that cannot be used any more.
+
+        What was kept stays where it is: a mesh that went may come back.
+        """
+        self.code, self.lost = UNUSABLE, "the scene put last is lost"
+        self.problem = (
+            f"{self._place()}: the scene that {who} put cannot be used, the site's own holds:"
+            f" {error}; put it again, or the site's own"
+        )
+        self._say.warn("scene", self.problem, code=UNUSABLE)
         return own_scene(self._site)
 
     def keep(self, found: SceneText) -> bool:
@@ -127,14 +145,18 @@ class SceneKeeper:
             with self._file() as file:
                 file.write(msgspec.json.encode(kept))
         except ModelFileError as error:
+            self.code = NOT_KEPT
             self.problem = f"the scene that was put is lost when the guard starts anew: {error}"
-            self._say.warn("scene", self.problem)
+            self._say.warn("scene", self.problem, code=NOT_KEPT)
             return False
         self.problem = None
         return True
 
     def _file(self) -> ModelFile:
-        return ModelFile(model_folder(self._site) / Path(_NAME), MAX_SCENE_BYTES)
+        return ModelFile(self._place(), MAX_SCENE_BYTES)
+
+    def _place(self) -> Path:
+        return model_folder(self._site) / _NAME
 
 
 def _decode(content: bytes) -> _Kept:

@@ -92,14 +92,14 @@ class Worker:
         timed = TimedSweeper(machine.sweeper, self._pulse.sweep_ms)
         self._guard = machine.guard(start_s, boot, timed)
         self._keeper, self._canary, self._marker, self._show = keeper, canary, marker, show
-        self._restarted = marker.after(restarted_after())
+        self._restarted = _cause(marker.after(restarted_after()), scenes.keeper.lost)
         keeper.begin(self._guard.rampe, start_s, self._guard.situations)
         self._intake = Intake(bus, site, say)
         self._alerts = bus.outbox(f"{base}/alert", "rampe.alert.v1", urgent=True)
         self._predictions = bus.outbox(f"{base}/prediction", "rampe.prediction.v1")
         self._beats = bus.outbox(f"{base}/heartbeat", "rampe.heartbeat.v1", urgent=True)
         self._states = bus.desk(f"{base}/state")
-        audit = Audit(say)
+        audit = self._audit = Audit(say)
         self._orders = Orders(bus, site, self._guard, audit, self._order_done, keeper.hurry)
         self._scene = SceneDesk(bus, site, scenes, machine.sweeper, audit, self._change_scene)
         self._expiry = Expiry(site.zenoh)
@@ -197,6 +197,7 @@ class Worker:
                 _learned(self._guard.rampe),
                 self._keeper.failures,
                 connected,
+                self._audit.counts,
             ),
         )
         self._beats.put(wire.encode(self._heartbeat))
@@ -225,7 +226,8 @@ class Worker:
                 state = wire.encode(told)
             request.reply(state)
         self._orders.answer(now_s)
-        self._scene.answer()
+        self._scene.answer(now_s)
+        self._audit.turn(now_s)
 
     def _order_done(self, event: AlertEvent) -> bytes:
         return self._publish_alert(event, None)
@@ -245,6 +247,13 @@ def arrived(inputs: Inputs) -> bool:
     lists = (inputs.joystick, inputs.actuators, inputs.rejected)
     news = (inputs.canary, inputs.restarted)
     return any((*lists, inputs.objects, inputs.objects_rejected, inputs.enabled, *news))
+
+
+def _cause(restarted: str | None, lost: str | None) -> str | None:
+    """What a guard that begins has to tell until somebody has seen it."""
+    if lost is None:
+        return restarted
+    return f"{restarted or 'a stop'}; {lost}"
 
 
 def _learned(rampe: Rampe) -> wire.Learned:

@@ -11,6 +11,7 @@ from rampe_guard.wire.codec import MAX_PAYLOAD_BYTES, decode, encode
 from rampe_guard.wire.forget import Forget, Forgotten
 from rampe_guard.wire.health import (
     CanaryTrial,
+    Commands,
     Heartbeat,
     InputAges,
     InputRates,
@@ -48,6 +49,7 @@ __all__ = [
     "ActuatorsMessage",
     "Alert",
     "CanaryTrial",
+    "Commands",
     "EnabledMessage",
     "Endpoint",
     "Forget",

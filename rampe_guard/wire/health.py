@@ -96,6 +96,13 @@ class Resources(Message, frozen=True, kw_only=True):
     cpu_s: Annotated[float, Meta(description="Processor time since it started [s].")]
 
 
+class Commands(Message, frozen=True, kw_only=True):
+    """What people wanted of the guard since the boot, by command."""
+
+    granted: Annotated[dict[str, int], Meta(description="Done, by command.")]
+    refused: Annotated[dict[str, int], Meta(description="Refused, by command.")]
+
+
 class Heartbeat(Message, frozen=True, kw_only=True):
     """Health of the guard, sent from its worker loop."""
 
@@ -161,6 +168,9 @@ class Heartbeat(Message, frozen=True, kw_only=True):
     ] = None
     resources: Annotated[
         Resources | None, Meta(description="Memory and processor time; null unknown.")
+    ] = None
+    commands: Annotated[
+        Commands | None, Meta(description="What people wanted of it; null unknown.")
     ] = None
     steps: Annotated[
         int | None, Meta(description="Steps from a new position since the boot; null unknown.")

@@ -35,7 +35,7 @@ DIMENSIONLESS = {
     "axes", "category", "borrowed_from", "quaternion_xyzw", "dof",
     "probability", "share", "contact_fraction",
     "seq", "tick", "observations", "accepted", "rejected", "primitives", "drops", "count",
-    "situations", "similar_situations", "similar_contacts", "alerts", "steps",
+    "situations", "similar_situations", "similar_contacts", "granted", "refused", "alerts", "steps",
     "categories", "occurrences", "save_failures",
     "files", "messages", "waiting", "dropped",
 }  # fmt: skip
