@@ -1,8 +1,8 @@
 """Who may see a page and press its buttons: rules for one request, without any network.
 
 On loopback whoever works on this machine. Elsewhere whoever has the token: it comes with the first
-address, and then as a cookie. In both cases no page of somebody else's may speak through a browser
-(DNS rebinding: Host; websockets of other sites: Origin).
+address, and then a cookie that is made of it. In both cases no page of somebody else's may speak
+through a browser (DNS rebinding: Host; websockets of other sites: Origin).
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import hmac
 import ipaddress
 import re
+import socket
 from collections.abc import Sequence
 from dataclasses import dataclass
 from http import HTTPStatus
@@ -17,7 +18,7 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Final
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
-from rampe_guard.settings.network import stays_here
+from rampe_guard.settings.network import host_of, is_loopback
 
 SHORTEST: Final = 16
 """Characters of a token; fewer could be guessed."""
@@ -76,6 +77,7 @@ class Access:
         port: the same; it makes the cookie's name, since browsers share cookies among ports.
         token: that every request has to show; None: whoever reaches it, which must be loopback.
         names: further names by which browsers may call it, such as that of a proxy before it.
+            Beyond loopback its addresses and this computer's own name need not be given.
     """
 
     def __init__(
@@ -85,7 +87,13 @@ class Access:
             raise ValueError(f"{host} can be reached from outside, and there is no token")
         self._token = None if token is None else token.encode()
         self._names = {name.lower() for name in names}
+        self._far = not is_loopback(host)
+        self._own_names = {host.lower(), socket.gethostname().lower()} if self._far else set()
         self._cookie = f"{_COOKIE}-{port}"
+        # not the token: a browser's store of cookies gives it to nobody, and no other dashboard's
+        # cookie fits; made of it alone, so that pages outlive a new start with the same token
+        made = hmac.new(self._token or b"", self._cookie.encode(), "sha256")
+        self._pass = made.hexdigest().encode()
 
     @staticmethod
     def headers() -> dict[str, str]:
@@ -96,6 +104,7 @@ class Access:
         """An answer instead of a page; None if it may be had."""
         if not self._named(asked.host):
             text = f"called by a name that is not its own: {ascii(asked.host or '')[:80]}"
+            text += "; if it is, start the dashboard with it: --name"
             return Answer(HTTPStatus.FORBIDDEN, text, "wrong_host")
         if asked.origin is not None and not self._own(asked.origin, asked.host):
             return Answer(HTTPStatus.FORBIDDEN, "asked by a page of another site", "wrong_origin")
@@ -104,46 +113,39 @@ class Access:
         if self._token is None or self._shown(asked):
             return None
         given = dict(parse_qsl(urlsplit(asked.path).query)).get("token")
-        if given is None or not self._right(given) or asked.websocket:
+        if given is None or not _same(given, self._token) or asked.websocket:
             reason = "no_token" if given is None else "wrong_token"
             text = "This dashboard wants its token: open the address that it printed."
             return Answer(HTTPStatus.UNAUTHORIZED, text, reason, (("WWW-Authenticate", "Bearer"),))
-        cookie = f"{self._cookie}={given}; Path=/; HttpOnly; SameSite=Lax"
+        cookie = f"{self._cookie}={self._pass.decode()}; Path=/; HttpOnly; SameSite=Lax"
         there = (("Location", _without_token(asked.path)), ("Set-Cookie", cookie))
         return Answer(HTTPStatus.SEE_OTHER, "", "entered", (*there, ("Cache-Control", "no-store")))
 
     def _named(self, host: str | None) -> bool:
-        """Whether it may be called so. A token guards pages of any name: cookies are by name."""
-        name = _name(host)
+        """Whether it may be called so. No other site can make its pages come from an address."""
+        name = host_of(host)
         if name is None:
             return False
-        return self._token is not None or name in self._names or is_loopback(name)
+        if self._far and (name in self._own_names or _is_address(name)):
+            return True
+        return name in self._names or is_loopback(name)
 
     def _own(self, origin: str, host: str | None) -> bool:
         parts = urlsplit(origin)
         if parts.scheme not in {"http", "https"}:
             return False
-        return parts.netloc.lower() == (host or "").lower() or _name(parts.netloc) in self._names
+        return parts.netloc.lower() == (host or "").lower() or host_of(parts.netloc) in self._names
 
     def _shown(self, asked: Asked) -> bool:
         scheme, _, given = (asked.authorization or "").partition(" ")
-        if scheme.lower() == "bearer" and self._right(given.strip()):
+        bearer = self._token is not None and scheme.lower() == "bearer"
+        if bearer and _same(given.strip(), self._token or b""):
             return True
         try:
             cookie = SimpleCookie(asked.cookie or "").get(self._cookie)
         except CookieError:
             return False
-        return cookie is not None and self._right(cookie.value)
-
-    def _right(self, given: str) -> bool:
-        return self._token is not None and hmac.compare_digest(
-            given.encode("utf-8", "replace"), self._token
-        )
-
-
-def is_loopback(host: str) -> bool:
-    """Whether this name or address is this machine itself for certain."""
-    return stays_here(f"tcp/[{host}]:0" if ":" in host else f"tcp/{host}:0")
+        return cookie is not None and _same(cookie.value, self._pass)
 
 
 def wrong_token(token: str) -> str | None:
@@ -155,15 +157,16 @@ def wrong_token(token: str) -> str | None:
     return None
 
 
-def _name(host: str | None) -> str | None:
-    """The host of a Host header, without port and brackets."""
+def _same(given: str, secret: bytes) -> bool:
+    return hmac.compare_digest(given.encode("utf-8", "replace"), secret)
+
+
+def _is_address(name: str) -> bool:
     try:
-        name = urlsplit(f"//{host or ''}").hostname
-        if name and ":" in name:
-            return str(ipaddress.ip_address(name))
+        ipaddress.ip_address(name)
     except ValueError:
-        return None
-    return name
+        return False
+    return True
 
 
 def _without_token(path: str) -> str:

@@ -13,6 +13,7 @@ from rampe_guard.errors import SettingsError
 from rampe_guard.runtime.connecting import connect_to
 from rampe_guard.runtime.stopping import StopFlag
 from rampe_guard.settings import Site, load_site
+from rampe_guard.settings.network import is_loopback
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +38,7 @@ class Place:
         Raises:
             SettingsError: the file cannot be read, others may read it, or its token is too weak.
         """
-        from rampe_guard.dashboard.access import is_loopback, wrong_token  # noqa: PLC0415
+        from rampe_guard.dashboard.access import wrong_token  # noqa: PLC0415
 
         if self.token_file is None:
             return None if is_loopback(self.host) else secrets.token_urlsafe(24)

@@ -19,6 +19,7 @@ from typing import Any, Final, Self
 
 from rampe_guard.errors import SettingsError
 from rampe_guard.runtime.metrics import CONTENT_TYPE, Metrics
+from rampe_guard.settings.network import host_of, is_loopback
 
 FRESH_S: Final = 0.2
 """A text is served again for so long: a heartbeat's time."""
@@ -40,10 +41,18 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """Answer ``/metrics``, and where it is."""
-        if self.path.partition("?")[0] == "/metrics":
+        if not self._named():
+            text = b"called by a name that is not this computer's own; see 127.0.0.1\n"
+            self._answer(HTTPStatus.FORBIDDEN, "text/plain", text)
+        elif self.path.partition("?")[0] == "/metrics":
             self._answer(HTTPStatus.OK, CONTENT_TYPE, self.server.text())
         else:
             self._answer(HTTPStatus.NOT_FOUND, "text/plain", b"see /metrics\n")
+
+    def _named(self) -> bool:
+        """On loopback by no other name: a page of another site would read it (DNS rebinding)."""
+        hosts = self.headers.get_all("Host", [])
+        return not self.server.here or all(is_loopback(host_of(host) or "") for host in hosts)
 
     def _answer(self, code: HTTPStatus, kind: str, body: bytes) -> None:
         self.send_response(code)
@@ -63,6 +72,7 @@ class _Server(HTTPServer):
 
     def __init__(self, address: tuple[str, int]) -> None:
         self._seats = threading.Semaphore(AT_ONCE)
+        self.here = is_loopback(address[0])
         if ":" in address[0]:
             self.address_family = AF_INET6
         super().__init__(address, _Handler)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator
-from ipaddress import ip_address
 from typing import TypeAlias
 
 from rampe_guard import wire
@@ -12,6 +11,7 @@ from rampe_guard.errors import SettingsError
 from rampe_guard.runtime.health import Pulse
 from rampe_guard.runtime.say import Sayer
 from rampe_guard.settings import MetricsSettings
+from rampe_guard.settings.network import is_loopback
 
 Show: TypeAlias = Callable[[wire.Heartbeat, Pulse, float], None]
 """Takes a heartbeat, the durations behind it, and when it was made [s]; never waits."""
@@ -52,11 +52,3 @@ def _serve(host: str, port: int, say: Sayer, stack: contextlib.ExitStack) -> Sho
     warning = "" if is_loopback(host) else ", to everyone who reaches this computer"
     say.info(f"metrics on {url}{warning}", url=url)
     return metrics.show
-
-
-def is_loopback(host: str) -> bool:
-    """Whether only this computer reaches it."""
-    try:
-        return ip_address(host).is_loopback
-    except ValueError:  # a name; that of no other computer is certain
-        return host == "localhost"

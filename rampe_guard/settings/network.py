@@ -9,6 +9,7 @@ from __future__ import annotations
 import ipaddress
 import re
 from typing import Final
+from urllib.parse import urlsplit
 
 PLAIN_NETWORK: Final = "i accept that anyone on this network can read and forge messages"
 """What a site file has to say before plain messages leave the machine."""
@@ -51,6 +52,22 @@ def stays_here(endpoint: str) -> bool:
         return ipaddress.ip_address(host.removeprefix("[").removesuffix("]")).is_loopback
     except ValueError:
         return False
+
+
+def is_loopback(host: str) -> bool:
+    """Whether this name or address is this machine itself for certain."""
+    return stays_here(f"tcp/[{host}]:0" if ":" in host else f"tcp/{host}:0")
+
+
+def host_of(header: str | None) -> str | None:
+    """The name or address in an HTTP Host header, without port and brackets; None if none is."""
+    try:
+        name = urlsplit(f"//{header or ''}").hostname
+        if name and ":" in name:
+            return str(ipaddress.ip_address(name))
+    except ValueError:
+        return None
+    return name
 
 
 def exposed(endpoint: str, *, verifies_names: bool = True) -> str | None:

@@ -33,7 +33,7 @@ class Far:
     port: int
     process: Process
     token: str
-    cookie: str = ""
+    cookie: str
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +47,8 @@ def far(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Far]:
         process.wait_for("dashboard on", 60.0)
         found = re.search(rf"dashboard on http://0\.0\.0\.0:{port}/\?token=(\S+)", process.out)
         assert found is not None
-        yield Far(port, process, found[1], f"rampe-guard-dashboard-{port}={found[1]}")
+        _, headers, _ = get(port, f"/?token={found[1]}")
+        yield Far(port, process, found[1], headers["set-cookie"].partition(";")[0])
         assert "Traceback" not in process.err, process.err
         assert found[1] not in process.err
     finally:
@@ -90,6 +91,7 @@ def test_the_printed_address_opens_the_page(far: Far) -> None:
     status, headers, _ = get(far.port, f"/?token={far.token}")
     assert (status, headers["location"]) == (303, "/")
     assert headers["set-cookie"].partition(";")[0] == far.cookie
+    assert far.token not in far.cookie
     status, headers, body = get(far.port, Cookie=far.cookie)
     assert status == 200
     assert b"<html" in body[:500].lower()
@@ -104,6 +106,14 @@ def test_other_sites_open_no_websocket_even_with_the_cookie(far: Far) -> None:
     assert opened(far.port, Cookie=far.cookie, Origin=f"http://127.0.0.1:{far.port}") == 101
     assert opened(far.port, Cookie=far.cookie, Origin="http://evil.example") == 403
     until(lambda: "refused: wrong_origin" in far.process.err, 5.0, "a word in the log")
+
+
+def test_by_a_foreign_name_the_token_opens_nothing(far: Far) -> None:
+    status, headers, body = get(far.port, f"/?token={far.token}", Host="evil.example")
+    assert (status, "set-cookie" in headers) == (403, False)
+    assert b"--name" in body
+    assert get(far.port, Host=f"evil.example:{far.port}", Cookie=far.cookie)[0] == 403
+    until(lambda: "refused: wrong_host" in far.process.err, 5.0, "a word in the log")
 
 
 def test_files_outside_of_the_page_are_not_there(far: Far) -> None:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import socket
 from dataclasses import replace
 from http import HTTPStatus
 from pathlib import Path
 
 import pytest
 
-from rampe_guard.dashboard.access import Access, Asked, is_loopback, wrong_token
+from rampe_guard.dashboard.access import Access, Answer, Asked, wrong_token
 from rampe_guard.errors import SettingsError
 from rampe_guard.programs.dashboarding import Place
+from rampe_guard.settings.network import is_loopback
 
 TOKEN = "0123456789-abcdefgh"  # noqa: S105 - of no dashboard
 HERE = Access("127.0.0.1", 8080)
@@ -77,17 +79,68 @@ def test_the_token_is_asked_for_and_becomes_a_cookie() -> None:
     assert (refused.status, refused.reason) == (HTTPStatus.UNAUTHORIZED, "no_token")
     assert TOKEN not in repr(refused)
 
-    entered = FAR.judge(replace(PAGE, path=f"/x?token={TOKEN}&y=1"))
-    assert entered is not None
-    headers = dict(entered.headers)
-    assert (entered.status, headers["Location"]) == (HTTPStatus.SEE_OTHER, "/x?y=1")
+    there = FAR.judge(replace(PAGE, path=f"/x?token={TOKEN}&y=1"))
+    assert there is not None
+    headers = dict(there.headers)
+    assert (there.status, headers["Location"]) == (HTTPStatus.SEE_OTHER, "/x?y=1")
     assert headers["Set-Cookie"].endswith("; Path=/; HttpOnly; SameSite=Lax")
     cookie = headers["Set-Cookie"].partition(";")[0]
     for asked in (PAGE, SOCKET):
         assert FAR.judge(replace(asked, cookie=f"other=1; {cookie}")) is None
         assert FAR.judge(replace(asked, authorization=f"Bearer {TOKEN}")) is None
-        assert FAR.judge(replace(asked, host="guard.example", cookie=cookie)) is None
-    assert Access("0.0.0.0", 8081, TOKEN).judge(replace(PAGE, cookie=cookie)) is not None  # noqa: S104
+        assert FAR.judge(replace(asked, host="10.0.0.7:8080", cookie=cookie)) is None
+    assert TOKEN not in cookie
+    name, _, value = cookie.partition("=")
+    as_token = replace(PAGE, path=f"/?token={value}")  # what a cookie tells opens nothing else
+    as_bearer = replace(PAGE, authorization=f"Bearer {value}")
+    as_cookie = replace(PAGE, cookie=f"{name}={TOKEN}")
+    for asked in (as_token, as_bearer, as_cookie):
+        answer = FAR.judge(asked)
+        assert answer is not None
+        assert answer.reason in {"no_token", "wrong_token"}
+    other = Access("0.0.0.0", 8081, TOKEN)  # noqa: S104
+    assert other.judge(replace(PAGE, cookie=cookie)) is not None
+    assert other.judge(replace(PAGE, cookie=f"{name[:-1]}1={value}")) is not None
+
+
+@pytest.mark.parametrize("host", ["evil.example", "evil.example:8080", None, "", "[", "10.0.0.1.x"])
+def test_the_right_token_is_none_under_a_foreign_name(host: str | None) -> None:
+    cookie = dict(entered().headers)["Set-Cookie"].partition(";")[0]
+    for asked in (
+        replace(PAGE, path=f"/?token={TOKEN}", host=host),
+        replace(PAGE, authorization=f"Bearer {TOKEN}", host=host),
+        replace(PAGE, cookie=cookie, host=host),
+        replace(SOCKET, cookie=cookie, host=host),
+    ):
+        answer = FAR.judge(asked)
+        assert answer is not None
+        assert (answer.status, answer.reason) == (HTTPStatus.FORBIDDEN, "wrong_host")
+        assert "Set-Cookie" not in dict(answer.headers)
+
+
+def entered() -> Answer:
+    answer = FAR.judge(replace(PAGE, path=f"/?token={TOKEN}"))
+    assert answer is not None
+    return answer
+
+
+def test_beyond_loopback_it_goes_by_its_addresses_its_own_name_and_those_that_are_told() -> None:
+    far = Access("guard.example", 8080, TOKEN, ["Wall.Example"])
+    shown = replace(PAGE, authorization=f"Bearer {TOKEN}")
+    own = socket.gethostname()
+    for host in (
+        "10.0.0.7:8080",
+        "[fe80::1]:8080",
+        "localhost",
+        "guard.example",
+        "WALL.example",
+        own,
+    ):
+        assert far.judge(replace(shown, host=host)) is None
+        assert far.judge(replace(PAGE, host=host)) is not None
+    here = Access("127.0.0.1", 8080, TOKEN)  # a token behind a proxy: only names that are told
+    for host in ("10.0.0.7:8080", "guard.example"):
+        assert here.judge(replace(shown, host=host)) is not None
 
 
 @pytest.mark.parametrize("given", ["", "x", TOKEN[:-1], TOKEN + "x", TOKEN.upper(), "é", "\ud800"])

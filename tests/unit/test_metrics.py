@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import http.client
 import socket
 import time
 import urllib.error
@@ -23,9 +24,10 @@ from rampe_guard.runtime import metrics_server
 from rampe_guard.runtime.health import Pulse
 from rampe_guard.runtime.metrics import OLD_S, Metrics
 from rampe_guard.runtime.metrics_server import MetricsServer
-from rampe_guard.runtime.metrics_start import is_loopback, served
+from rampe_guard.runtime.metrics_start import served
 from rampe_guard.runtime.say import Sayer
 from rampe_guard.settings import MetricsSettings, load_site
+from rampe_guard.settings.network import is_loopback
 from tests.support.processes import BENCH, until
 
 SAY = Sayer("rampe_guard.test")
@@ -151,6 +153,41 @@ def test_it_is_served_as_prometheus_asks(server: MetricsServer) -> None:
     assert "rampe_guard_status" in scraped(text).keys().__str__()
     with pytest.raises(urllib.error.HTTPError, match="404"):
         get(server, "/etc/passwd")
+
+
+@pytest.mark.parametrize(
+    ("host", "code"),
+    [
+        *(("127.0.0.1:1", 200), ("localhost", 200), ("[::1]:9464", 200), (None, 200)),
+        *(
+            ("evil.example", 403),
+            ("127.0.0.1.evil.example:9464", 403),
+            ("10.0.0.1", 403),
+            ("", 403),
+        ),
+    ],
+)
+def test_on_loopback_no_other_name_leads_there(
+    server: MetricsServer, host: str | None, code: int
+) -> None:
+    """DNS rebinding: a browser believes that it talks to evil.example."""
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=5.0)
+    with contextlib.closing(connection):
+        connection.putrequest("GET", "/metrics", skip_host=True)
+        if host is not None:
+            connection.putheader("Host", host)
+        connection.endheaders()
+        answer = connection.getresponse()
+        assert answer.status == code
+        assert (b"rampe_guard_status" in answer.read()) is (code == 200)
+
+
+def test_beyond_loopback_it_is_found_by_any_name() -> None:
+    with MetricsServer(Metrics(), "0.0.0.0", 0) as far:  # noqa: S104
+        address = f"http://127.0.0.1:{far.port}/metrics"
+        asked = urllib.request.Request(address, headers={"Host": "guard.example:9464"})
+        with urllib.request.urlopen(asked, timeout=5.0) as answer:  # noqa: S310
+            assert answer.status == 200
 
 
 def test_clients_that_never_ask_are_cut_off(server: MetricsServer) -> None:
