@@ -11,12 +11,14 @@
 # FOLDER/NAME holds what NAME's host needs and nothing else: ca.crt, tls.crt, tls.key.
 # Folders are 0700 and keys 0600. Nothing is overwritten but by `renew`, whose files appear whole.
 # Zenoh reads no revocation lists: who is to be kept out is taken from access.yaml (and the router
-# started anew), and certificates live briefly: 90 days, the authority 3650.
+# started anew), and certificates live briefly: 90 days, the authority 3650. None outlives the
+# authority: its days are cut, with a word.
 set -euo pipefail
 umask 077
 
 fail() {
-  echo "certificates.sh: $*" >&2
+  local text="$*"
+  echo "certificates.sh: ${text//[[:cntrl:]]/ }" >&2
   exit 2
 }
 
@@ -50,12 +52,31 @@ valid_name() {
   [ "$1" != ca ] || fail "the name 'ca' is the authority's own"
 }
 
+# An address of version 4 has four parts up to 255; what else looks like one is no host name either.
+is_ipv4() {
+  local part parts
+  [[ $1 =~ ^[0-9]{1,3}(\.[0-9]{1,3}){3}$ ]] || return 1
+  IFS=. read -ra parts <<<"$1"
+  for part in "${parts[@]}"; do
+    [ "$((10#$part))" -le 255 ] || return 1
+  done
+}
+
+is_ipv6() {
+  local groups=${1//[^:]/}
+  [[ $1 =~ ^([0-9A-Fa-f]{0,4}:){2,7}[0-9A-Fa-f]{0,4}$ && $1 != *:::* && ! $1 =~ ::.*:: ]] || return 1
+  [[ $1 =~ ^(::|[0-9A-Fa-f]) && $1 =~ (::|[0-9A-Fa-f])$ ]] || return 1
+  [[ $1 == *::* || ${#groups} -eq 7 ]]
+}
+
 alternative_names() {
   local address list=''
   for address in "$@"; do
-    if [[ $address =~ ^[0-9.]+$ || $address =~ ^[0-9A-Fa-f:.]*:[0-9A-Fa-f:.]*$ ]]; then
+    if is_ipv4 "$address" || is_ipv6 "$address"; then
       list+=",IP:$address"
-    elif [[ $address =~ ^[A-Za-z0-9.-]+$ ]]; then
+    elif [[ $address =~ ^[0-9.:]+$ ]]; then
+      fail "'$address' is no IP address"
+    elif [[ $address =~ ^[A-Za-z0-9]([A-Za-z0-9.-]{0,251}[A-Za-z0-9])?$ && $address != *..* ]]; then
       list+=",DNS:$address"
     else
       fail "'$address' is neither a host name nor an IP address"
@@ -88,10 +109,26 @@ make_authority() {
   echo "$folder/ca: the authority '$common', for $lifetime days"
 }
 
+# days_left FOLDER DAYS: so many, or as many as the authority has left.
+days_left() {
+  local end left
+  end=$(openssl x509 -in "$1/ca/ca.crt" -noout -enddate | cut -d= -f2)
+  left=$((($(date -d "$end" +%s) - $(date +%s) - 60) / 86400))
+  [ "$left" -ge 1 ] ||
+    fail "the authority $1/ca ends on $end: make a new one in another folder, and new certificates"
+  if [ "$2" -gt "$left" ]; then
+    echo "certificates.sh: $left days instead of $2: the authority itself ends on $end" >&2
+    echo "$left"
+  else
+    echo "$2"
+  fi
+}
+
 # make_certificate FOLDER NAME DAYS SAN: fills FOLDER/NAME.
 make_certificate() {
   local folder=$1 common=$2 lifetime=$3 san=$4 usage=clientAuth work file
   [ -f "$folder/ca/ca.key" ] || fail "$folder/ca/ca.key is not there; make the authority first: ca"
+  lifetime=$(days_left "$folder" "$lifetime")
   # a router is a client of other routers, too; a client may never stand in for a router
   [ -z "$san" ] || usage="serverAuth, clientAuth"
   work=$(mktemp -d "$folder/.new.XXXXXX")
@@ -128,6 +165,8 @@ san_of() {
 
 list_certificates() {
   local file
+  [ -d "$1" ] || fail "$1 is no folder that is there"
+  [ -f "$1/ca/ca.crt" ] || fail "$1/ca/ca.crt is not there; make the authority first: ca"
   for file in "$1"/*/tls.crt "$1"/ca/ca.crt; do
     [ -f "$file" ] || continue
     printf '%-40s %s\n' "$(basename "$(dirname "$file")")" \

@@ -98,6 +98,11 @@ def test_what_is_there_is_listed_and_nothing_is_left_over(pki: Pki) -> None:
         (("issue", "x", "--weeks", "1"), "--weeks is no option"),
         (("router", "x", "a;b"), "is neither a host name nor an IP address"),
         (("router", "x", "1.2.3.4\nsubjectAltName=DNS:y"), "is neither"),
+        (("router", "x", "999.1.2.3"), "'999.1.2.3' is no IP address"),
+        (("router", "x", "1.2.3"), "'1.2.3' is no IP address"),
+        (("router", "x", "1:2:3"), "'1:2:3' is no IP address"),
+        (("router", "x", "fe80:::1"), "is neither a host name nor an IP address"),
+        (("router", "x", "a..b"), "is neither a host name nor an IP address"),
         (("router", "x"), "certificates.sh router FOLDER NAME ADDRESS"),
         (("renew", "nobody"), "is not there; make it first"),
         (("make", "x"), "certificates.sh ca FOLDER"),
@@ -108,6 +113,8 @@ def test_what_cannot_be_is_refused(pki: Pki, args: tuple[str, ...], told: str) -
     done = certificates(args[0], pki.folder, *args[1:])
     assert done.returncode == 2
     assert told in done.stderr
+    lines = done.stderr.splitlines()
+    assert len(lines) == 1 or "FOLDER" in told, lines  # the usage has more
     after = {path: path.read_bytes() for path in pki.folder.rglob("*") if path.is_file()}
     assert after == before
 
@@ -117,6 +124,40 @@ def test_without_an_authority_there_is_none(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert "make the authority first" in done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def test_no_certificate_outlives_its_authority(tmp_path: Path) -> None:
+    folder = tmp_path / "pki"
+    assert certificates("ca", folder, "--days", "20").returncode == 0
+    done = certificates("issue", folder, "x", "--days", "60")
+    assert done.returncode == 0
+    assert done.stderr.startswith(
+        "certificates.sh: 19 days instead of 60: the authority itself ends"
+    )
+    assert done.stdout.endswith("for 19 days\n")
+    assert days(folder / "x" / "tls.crt") == 19
+    certificates("issue", folder, "y", "--days", "19")
+    assert days(folder / "y" / "tls.crt") == 19
+
+
+def test_addresses_of_both_kinds_are_taken(pki: Pki) -> None:
+    wanted = ["10.0.0.1", "::1", "fe80::2:3", "1:2:3:4:5:6:7:8", "router-a.quarry.example", "x"]
+    done = certificates("router", pki.folder, "wide", *wanted)
+    assert done.returncode == 0, done.stderr
+    shown = extensions(pki.folder / "wide" / "tls.crt")
+    for name in ("10.0.0.1", "0:0:0:0:0:0:0:1", "FE80:0:0:0:0:0:2:3", "1:2:3:4:5:6:7:8", "DNS:x"):
+        assert name in shown
+    shutil.rmtree(pki.folder / "wide")
+
+
+def test_a_folder_that_is_not_there_holds_no_list(tmp_path: Path) -> None:
+    for place, said in (
+        (tmp_path / "none", "is no folder"),
+        (tmp_path, "make the authority first"),
+    ):
+        done = certificates("list", place)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert said in done.stderr
 
 
 def test_a_renewed_one_has_another_key_and_the_same_name(pki: Pki) -> None:
