@@ -115,7 +115,7 @@ def workplace(tmp_path: Path) -> Iterator[Workplace]:
 def test_what_was_learned_outlives_the_guard_and_goes_when_told(workplace: Workplace) -> None:
     site = workplace.site_path
     args = (site, "--operator", "Anna")
-    nothing = command("model", "show", site, state=workplace.state)
+    nothing = called("model", "show", site, state=workplace.state)
     assert nothing.returncode == 2
     assert "nothing is kept of operator 'operator' yet" in nothing.stderr
     with workplace.guard() as guard:
@@ -143,11 +143,11 @@ def test_what_was_learned_outlives_the_guard_and_goes_when_told(workplace: Workp
         assert first.body["mean"]["swing"] * last[0] > 0.0
         workplace.ears.wait("prediction", _learned, 5.0, start_s)
         workplace.saved(7)
-        shown = command("model", "show", site, state=workplace.state)  # also while it runs
+        shown = called("model", "show", site, state=workplace.state)  # also while it runs
         assert shown.returncode == 0, shown.stderr
         assert "7 primitives of 2 categories" in shown.stdout
         assert str(workplace.model()) in shown.stdout.replace("\n", "").replace(" ", "")
-        held = command("model", "reset", site, state=workplace.state)
+        held = called("model", "reset", site, state=workplace.state)
         assert held.returncode == 2
         assert f"is held by a running guard, process {processes.guarding(guard)}" in held.stderr
         assert workplace.model().exists()
@@ -156,9 +156,9 @@ def test_what_was_learned_outlives_the_guard_and_goes_when_told(workplace: Workp
     with workplace.guard("--operator", "Anna") as guard:
         assert "operator 'Anna': nothing learned yet" in guard.err
         guard.signal_and_wait(signal.SIGINT)
-    assert command("model", "show", *args, state=workplace.state).returncode == 2
+    assert called("model", "show", *args, state=workplace.state).returncode == 2
 
-    exported = command("model", "export", site, state=workplace.state)
+    exported = called("model", "export", site, state=workplace.state)
     model = json.loads(exported.stdout)
     assert model["situations"]["count"] >= remembered  # the kill took only what was new
     assert model["header"]["occurrences"] == sum(r["occurrences"] for r in model["categories"]) == 7
@@ -170,13 +170,13 @@ def test_what_was_learned_outlives_the_guard_and_goes_when_told(workplace: Workp
 
 def _forget(workplace: Workplace) -> None:
     site = workplace.site_path
-    forgotten = command("model", "reset", site, state=workplace.state)
+    forgotten = called("model", "reset", site, state=workplace.state)
     assert forgotten.returncode == 0, forgotten.stderr
     assert f"deleted {workplace.model()}" in forgotten.stdout
     left = [path.name for path in workplace.model().parent.iterdir()]
     assert [name for name in left if name.startswith("operator")] == []
     for action in ("show", "export"):
-        gone = command("model", action, site, state=workplace.state)
+        gone = called("model", action, site, state=workplace.state)
         assert (gone.returncode, gone.stdout) == (2, "")
         assert "Traceback" not in gone.stderr
 
@@ -196,7 +196,7 @@ def test_a_spoilt_model_is_set_aside_and_the_guard_works(workplace: Workplace) -
         guard.signal_and_wait(signal.SIGTERM)
     spoilt = workplace.model().read_bytes()[:-40]
     workplace.model().write_bytes(spoilt)
-    shown = command("model", "show", workplace.site_path, state=workplace.state)
+    shown = called("model", "show", workplace.site_path, state=workplace.state)
     assert shown.returncode == 2
     assert "it is damaged or no model file" in shown.stderr
     with workplace.guard() as guard:
@@ -209,7 +209,7 @@ def test_a_spoilt_model_is_set_aside_and_the_guard_works(workplace: Workplace) -
         assert guard.alive
         assert "Traceback" not in guard.err
     assert aside.read_bytes() == spoilt
-    forgotten = command("model", "reset", workplace.site_path, state=workplace.state)
+    forgotten = called("model", "reset", workplace.site_path, state=workplace.state)
     assert forgotten.returncode == 0
     assert not aside.exists()  # forgotten means all of it
 

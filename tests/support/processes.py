@@ -17,6 +17,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Self, TypeVar
+from unittest import mock
 
 from rampe_guard.cli import main
 
@@ -204,11 +205,15 @@ def command(
     )
 
 
-def called(*args: str | Path) -> subprocess.CompletedProcess[str]:
+def called(*args: str | Path, state: Path | None = None) -> subprocess.CompletedProcess[str]:
     """The same within this process, for commands that end by themselves and start nothing."""
     out, err = io.StringIO(), io.StringIO()
     given = [str(arg) for arg in args]
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+    with (
+        mock.patch.dict(os.environ, {} if state is None else environment(state)),
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+    ):
         code = main(given)
     return subprocess.CompletedProcess(given, code, out.getvalue(), err.getvalue())
 

@@ -1,4 +1,4 @@
-"""Noise at a threshold, at 100 Hz for a minute: people are told once, not a thousand times."""
+"""Noise at a threshold, at 100 Hz for 20 s, nightly for a minute: people are told once."""
 
 from __future__ import annotations
 
@@ -26,8 +26,9 @@ from rampe_guard.core.types import (
     ZoneSweep,
 )
 from tests.support.core_rig import CONFIG, LIMITS
+from tests.support.depth import depth
 
-STEPS, DT = 6000, 0.01
+STEPS, DT = depth(2000, 6000), 0.01
 STOP_S = 0.8
 
 
