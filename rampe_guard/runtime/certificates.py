@@ -31,19 +31,24 @@ def check_files(files: TlsFiles, now_unix_s: float | None = None) -> float:
         now_unix_s: wall clock; the present if left out [s].
 
     Raises:
-        SettingsError: naming the file, what is wrong with it and what to do.
+        SettingsError: naming site file and key, the file, what is wrong with it and what to do.
     """
+    of_root, of_certificate, of_key = files.said
     now = time.time() if now_unix_s is None else now_unix_s
-    days = [_days(files.root_ca, now)]
+    days = [_days(files.root_ca, now, of_root)]
     if files.certificate is not None and files.key is not None:
-        check_private(files.key)
-        days.append(_days(files.certificate, now))
-        _check_pair(files.certificate, files.key)
+        check_private(files.key, of_key)
+        days.append(_days(files.certificate, now, of_certificate))
+        _check_pair(files.certificate, files.key, of_key)
     return min(days)
 
 
-def check_private(key: str) -> None:
+def check_private(key: str, said: str = "zenoh") -> None:
     """Refuse a private key that others than its owner may read.
+
+    Args:
+        key: its file.
+        said: where that is named, for messages.
 
     Raises:
         SettingsError: they may, or it is not there.
@@ -51,47 +56,47 @@ def check_private(key: str) -> None:
     try:
         mode = Path(key).stat().st_mode & 0o777
     except OSError as error:
-        raise SettingsError(f"zenoh: {key}: cannot be read ({error.strerror})") from None
+        raise SettingsError(f"{said}: {key}: cannot be read ({error.strerror})") from None
     if mode & 0o077:
         raise SettingsError(
-            f"zenoh: {key}: others than its owner may use this private key (mode {mode:04o});"
+            f"{said}: {key}: others than its owner may use this private key (mode {mode:04o});"
             f" chmod 600 {key}, and make a new one if somebody may have read it"
         )
 
 
-def _days(file: str, now_unix_s: float) -> float:
+def _days(file: str, now_unix_s: float, said: str) -> float:
     try:
         with Path(file).open("rb") as stream:
             text = stream.read(_MOST).decode("ascii", "replace")
     except OSError as error:
-        raise SettingsError(f"zenoh.tls: {file}: cannot be read ({error.strerror})") from None
+        raise SettingsError(f"{said}: {file}: cannot be read ({error.strerror})") from None
     blocks = _PEM.findall(text)
     if not blocks:
-        raise SettingsError(f"zenoh.tls: {file}: holds no certificate (PEM); give another file")
+        raise SettingsError(f"{said}: {file}: holds no certificate (PEM); give another file")
     least = float("inf")
     for block in blocks:
         try:
             begin, end = validity(ssl.PEM_cert_to_DER_cert(block))
         except ValueError as error:
-            raise SettingsError(f"zenoh.tls: {file}: is no certificate: {error}") from None
+            raise SettingsError(f"{said}: {file}: is no certificate: {error}") from None
         if now_unix_s < begin:
             raise SettingsError(
-                f"zenoh.tls: {file}: is not valid before {_date(begin)}, and it is"
+                f"{said}: {file}: is not valid before {_date(begin)}, and it is"
                 f" {_date(now_unix_s)}; set the clock, or make the certificate anew"
             )
         if now_unix_s >= end:
             raise SettingsError(
-                f"zenoh.tls: {file}: expired on {_date(end)}, and it is {_date(now_unix_s)};"
+                f"{said}: {file}: expired on {_date(end)}, and it is {_date(now_unix_s)};"
                 " make a new one (deploy/certificates.sh), or set the clock"
             )
         least = min(least, (end - now_unix_s) / DAY_S)
     return least
 
 
-def _check_pair(certificate: str, key: str) -> None:
+def _check_pair(certificate: str, key: str, said: str) -> None:
     def locked() -> str:
         raise SettingsError(
-            f"zenoh.tls: {key}: is locked with a password, which nobody can type here; give a key"
+            f"{said}: {key}: is locked with a password, which nobody can type here; give a key"
             " without one that only its owner may read"
         )
 
@@ -101,7 +106,7 @@ def _check_pair(certificate: str, key: str) -> None:
     except (OSError, ValueError) as error:  # ssl.SSLError is an OSError
         reason = getattr(error, "reason", None) or error
         raise SettingsError(
-            f"zenoh.tls: {key}: is not the private key of {certificate} ({reason})"
+            f"{said}: {key}: is not the private key of {certificate} ({reason})"
         ) from None
 
 

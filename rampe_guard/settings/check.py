@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from rampe_guard.settings import network
 from rampe_guard.settings.drive_model import impossible
-from rampe_guard.settings.network import PROVEN, protocol
+from rampe_guard.settings.network import PROVEN, protocol, shown
 from rampe_guard.settings.problems import KeyPath, Problems, did_you_mean, show
 from rampe_guard.settings.site_model import (
     ArmModel,
@@ -94,6 +95,25 @@ def _zenoh(model: SiteModel, problems: Problems) -> None:
     elif zenoh.connect == ():
         what = "names no endpoint, and scouting is off"
         problems.add(("zenoh", "connect"), what, "give one, such as tcp/127.0.0.1:7447")
+    else:
+        _endpoints(zenoh, problems)
+
+
+def _endpoints(zenoh: ZenohModel, problems: Problems) -> None:
+    for place, endpoint in enumerate(zenoh.connect or ()):
+        where: KeyPath = ("zenoh", "connect", place)
+        if reason := network.impossible(endpoint):
+            what, remedy = f"{show(shown(endpoint))} {reason}", "give PROTOCOL/HOST:PORT"
+            problems.add(where, what, remedy)
+        elif (
+            protocol(endpoint) in PROVEN
+            and zenoh.tls is None
+            and not network.brings_authority(endpoint)
+        ):
+            what = f"{show(shown(endpoint))} is proven by certificates, and there are none"
+            problems.add(
+                where, what, "add zenoh.tls: {root_ca: FILE, certificate: FILE, key: FILE}"
+            )
 
 
 def _tls(zenoh: ZenohModel, tls: TlsModel, problems: Problems) -> None:
@@ -105,7 +125,9 @@ def _tls(zenoh: ZenohModel, tls: TlsModel, problems: Problems) -> None:
         what = "stands beside a config file"
         problems.add(("zenoh", "tls"), what, "put the certificates into that file")
     elif not any(protocol(end) in PROVEN for end in zenoh.connect or ()):
-        what = "is given, and no endpoint uses it"
+        what = "is given, and every endpoint is plain"
+        if zenoh.connect:
+            what += f" ({shown(zenoh.connect[0])})"
         problems.add(("zenoh", "tls"), what, "connect to one such as tls/router.example:7447")
 
 

@@ -18,6 +18,9 @@ PROVEN: Final = ("tls", "quic")
 LOCAL: Final = ("unixsock-stream", "unixpipe")
 """Protocols that cannot leave the machine."""
 
+_WITH_PORT: Final = ("tcp", "udp", "ws", *PROVEN)
+_HIGHEST_PORT: Final = 65535
+_HOST = re.compile(r"\[[^\[\]]+\]|[^\[\]:]+")
 _UNVERIFIED = re.compile(r"[#;]verify_name_on_connect=(?!true(?:;|$))")
 _USER = re.compile(r"(?<=/)[^/@]*@")
 
@@ -68,6 +71,24 @@ def host_of(header: str | None) -> str | None:
     except ValueError:
         return None
     return name
+
+
+def impossible(endpoint: str) -> str | None:
+    """Why nobody could ever be met at this endpoint, as far as it shows; None if it does not."""
+    if protocol(endpoint) not in _WITH_PORT:
+        return None
+    address = re.split("[?#]", endpoint.partition("/")[2], maxsplit=1)[0]
+    host, _, port = address.rpartition(":")
+    if _HOST.fullmatch(host) is None or not (port.isascii() and port.isdigit()):
+        return "names no HOST:PORT"
+    if len(port) > len(str(_HIGHEST_PORT)) or not 0 < int(port) <= _HIGHEST_PORT:
+        return f"has no port from 1 to {_HIGHEST_PORT}"
+    return None
+
+
+def brings_authority(endpoint: str) -> bool:
+    """Whether it names by itself the authority that its router is proven by."""
+    return "root_ca_certificate" in endpoint.partition("#")[2]
 
 
 def exposed(endpoint: str, *, verifies_names: bool = True) -> str | None:

@@ -31,8 +31,12 @@ class Problems:
     def add(self, path: KeyPath, what: str, remedy: str) -> None:
         """Note that the value at ``path`` is wrong."""
         line = self._document.line(path)
-        key = f"{dotted(path)}: " if path else ""
-        self._own.append((line, f"{self._document.file}:{line}: {key}{what}; {remedy}"))
+        self._own.append((line, f"{self.where(path)}: {what}; {remedy}"))
+
+    def where(self, path: KeyPath) -> str:
+        """``file:line: dotted.key``, for what is only found out later."""
+        place = f"{self._document.file}:{self._document.line(path)}"
+        return f"{place}: {dotted(path)}" if path else place
 
     def extend(self, error: SettingsError) -> None:
         """Take over the problems of another file."""

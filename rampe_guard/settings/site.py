@@ -48,11 +48,16 @@ from rampe_guard.settings.source import Document, parse, read_bytes
 
 @dataclass(frozen=True, slots=True)
 class TlsFiles:
-    """Paths of PEM files; certificate and key are both there, or neither."""
+    """Paths of PEM files; certificate and key are both there, or neither.
+
+    Attributes:
+        said: where each of them is named: root_ca, certificate, key; for messages.
+    """
 
     root_ca: str
     certificate: str | None = None
     key: str | None = None
+    said: tuple[str, str, str] = ("zenoh.tls.root_ca", "zenoh.tls.certificate", "zenoh.tls.key")
 
 
 @dataclass(frozen=True, slots=True)
@@ -323,9 +328,12 @@ def _zenoh(
     tls = None
     if model.tls is not None:
         root = existing(("tls", "root_ca"), model.tls.root_ca, "certificate (PEM)")
+        root_at, certificate_at, key_at = (
+            problems.where(("zenoh", "tls", name)) for name in ("root_ca", "certificate", "key")
+        )
         certificate = existing(("tls", "certificate"), model.tls.certificate, "certificate (PEM)")
         key = existing(("tls", "key"), model.tls.key, "private key (PEM)")
-        tls = TlsFiles(root or "", certificate, key)
+        tls = TlsFiles(root or "", certificate, key, (root_at, certificate_at, key_at))
     connect = model.connect
     if connect is None:
         connect = () if config else (DEFAULT_ENDPOINT,)

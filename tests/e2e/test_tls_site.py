@@ -137,7 +137,8 @@ def test_a_router_by_another_name_is_not_believed(quarry: Quarry) -> None:
 class TestBeforeItIsUsed:
     def files(self, quarry: Quarry) -> TlsFiles:
         place = quarry.pki.folder / "guard"
-        return TlsFiles(*(str(place / name) for name in ("ca.crt", "tls.crt", "tls.key")))
+        root, certificate, key = (str(place / name) for name in ("ca.crt", "tls.crt", "tls.key"))
+        return TlsFiles(root, certificate, key)
 
     def test_days_are_those_that_openssl_made(self, quarry: Quarry) -> None:
         assert check_files(self.files(quarry)) == pytest.approx(90.0, abs=0.1)
@@ -149,8 +150,21 @@ class TestBeforeItIsUsed:
         with pytest.raises(SettingsError, match=r"ca\.crt: is not valid before .*set the clock"):
             check_files(self.files(quarry), now - 1 * DAY_S)
         quarry.pki.issue_for("late", -3600.0)
-        assert "SettingsError" in quarry.says("late")
-        assert "expired on" in quarry.says("late")
+        site = quarry.site("late")
+        line = site.read_text("utf-8").splitlines().index(self.block(site)) + 1
+        with pytest.raises(SettingsError) as caught:
+            check_configuration(load_site(site).zenoh)
+        where = (
+            f"{site}:{line}: zenoh.tls.certificate: {quarry.pki.folder}/late/tls.crt: expired on"
+        )
+        assert str(caught.value).startswith(where)
+        assert "SettingsError" in (said := quarry.says("late"))
+        assert "expired on" in said
+
+    def block(self, site: Path) -> str:
+        """The line with the certificates."""
+        (line,) = [text for text in site.read_text("utf-8").splitlines() if "root_ca" in text]
+        return line
 
     def test_a_key_of_another_certificate(self, quarry: Quarry) -> None:
         other = quarry.pki.folder / "router" / "tls.key"
@@ -194,7 +208,7 @@ class TestBeforeItIsUsed:
         site = load_site(quarry.site("guard"))
         check_configuration(site.zenoh)
         (quarry.pki.folder / "router" / "tls.key").chmod(0o640)
-        with pytest.raises(SettingsError, match="chmod 600"):
+        with pytest.raises(SettingsError, match=r"\.yaml:[0-9]+: zenoh\.tls\.key: .*chmod 600"):
             check_configuration(load_site(quarry.site("router")).zenoh)
         (quarry.pki.folder / "router" / "tls.key").chmod(0o600)
 

@@ -105,8 +105,18 @@ class TestTheSiteFile:
             ("{connect: [tls/a:1], tls: {root_ca: ca.pem, key: k.pem}}", "given without cert"),
             ("{connect: [tls/a:1], tls: {root_ca: ca.pem, certificate: ca.pem}}", "without key"),
             ("{config: z.json5, tls: {root_ca: ca.pem}}", "stands beside a config file"),
-            ("{tls: {root_ca: ca.pem}}", "no endpoint uses it"),
-            ("{connect: [tcp/a:1], tls: {root_ca: ca.pem}}", "no endpoint uses it"),
+            ("{tls: {root_ca: ca.pem}}", "given, and every endpoint is plain; connect to"),
+            ("{connect: [tcp/a:1], tls: {root_ca: ca.pem}}", r"endpoint is plain \(tcp/a:1\);"),
+            ("{connect: [quic/10.1.2.3:1]}", r"connect\[0\]: 'quic/10\.1\.2\.3:1' is proven by"),
+            (
+                "{connect: [tcp/a:1, tls/a:1?x]}",
+                r"connect\[1\]: 'tls/a:1…' is proven by .*add zenoh",
+            ),
+            ("{connect: [tcp/localhost:99999]}", r"connect\[0\]: .* no port from 1 to 65535"),
+            ("{connect: [tcp/localhost:0]}", "no port from 1 to 65535"),
+            ("{connect: [udp/localhost]}", "names no HOST:PORT"),
+            ("{connect: ['ws/::1:80']}", "names no HOST:PORT"),
+            ("{connect: ['tcp/a:b@c:²']}", "names no HOST:PORT"),
             ("{connect: [tls/a:1], tls: {root_ca: none.pem}}", "'none.pem' does not exist"),
             ("{connect: [tls/a:1], tls: {root_ca: /etc/x.pem}}", "outside the site's folder"),
         ],
@@ -116,6 +126,16 @@ class TestTheSiteFile:
             (tmp_path / name).write_text("{}")
         with pytest.raises(SettingsError, match=said):
             self.site(tmp_path, zenoh)
+
+    @pytest.mark.parametrize(
+        "endpoint",
+        [
+            *("tcp/[::1]:7447", "tcp/localhost:65535?prio=1", "unixsock-stream//run/z", "serial/x"),
+            "tls/a:1#root_ca_certificate_file=/x",
+        ],
+    )
+    def test_endpoints_that_may_be(self, tmp_path: Path, endpoint: str) -> None:
+        assert self.site(tmp_path, f"{{connect: ['{endpoint}']}}").connect == (endpoint,)
 
 
 def configured(folder: Path, **parts: object) -> ZenohSettings:
