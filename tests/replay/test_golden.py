@@ -8,6 +8,7 @@ When a change of behaviour is meant, look at what differs, then write the files 
 """
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -16,9 +17,9 @@ from rampe_guard.errors import InterruptedReplayError
 from rampe_guard.programs.replaying import replay_offline
 from rampe_guard.resources import shipped_site
 from rampe_guard.runtime.stopping import StopFlag
-from tests.support.depth import NIGHTLY
 
 HERE = Path(__file__).parent
+NIGHTLY = os.environ.get("RAMPE_GUARD_TESTS") == "nightly"
 LOGS = {
     "quarry": (str(shipped_site("demo")), str(HERE / "quarry.csv")),
     "bench": (None, str(HERE / "bench.mcap")),
