@@ -41,7 +41,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         code: int = args.command(args)
     except RampeGuardError as error:
-        print(_complaint(str(error), args), file=sys.stderr)
+        print(_complaint(error.lines, args), file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         return 130
@@ -49,17 +49,17 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:  # a full disk behind a redirection, say
-        print(_complaint(str(error), args), file=sys.stderr)
+        print(_complaint((str(error),), args), file=sys.stderr)
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 2
     return code
 
 
-def _complaint(text: str, args: argparse.Namespace) -> str:
-    """The last line of a command that cannot go on; as all lines are, if it writes a log."""
+def _complaint(lines: Sequence[str], args: argparse.Namespace) -> str:
+    """The last words of a command that cannot go on; as all lines are, if it writes a log."""
     from rampe_guard.runtime.log_lines import complaint
 
-    return complaint(text, vars(args).get("log_format", "text"))
+    return complaint(lines, vars(args).get("log_format", "text"))
 
 
 # Each command imports what it needs: `schema` should not wait for meshes and Zenoh.
@@ -268,8 +268,12 @@ def _schema(args: argparse.Namespace) -> int:
 
 def _access(args: argparse.Namespace) -> int:
     from rampe_guard.programs.access import write_router_config
+    from rampe_guard.runtime.log_lines import one_line
 
-    print(write_router_config(args.file, args.out), end="")
+    def note(text: str) -> None:
+        print(f"note: {one_line(text)}", file=sys.stderr)
+
+    print(write_router_config(args.file, args.out, note), end="")
     return 0
 
 

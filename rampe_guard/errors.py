@@ -22,9 +22,31 @@ from __future__ import annotations
 class RampeGuardError(Exception):
     """Base of every error that a user can cause and mend."""
 
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The message line by line; what else ends a line in it is part of a name or a value."""
+        return (str(self),)
+
 
 class SettingsError(RampeGuardError):
-    """A site or scene file is wrong; the message names file, line, key, value and remedy."""
+    """A site or scene file is wrong; the message names file, line, key, value and remedy.
+
+    Args:
+        problems: each is a line.
+    """
+
+    def __init__(self, *problems: str) -> None:
+        super().__init__("\n".join(problems))
+        self._problems = problems
+
+    def __reduce__(self) -> tuple[type[SettingsError], tuple[str, ...]]:
+        """From one process to another it keeps its lines."""
+        return type(self), self._problems
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The problems."""
+        return self._problems
 
 
 class GeometryError(RampeGuardError):

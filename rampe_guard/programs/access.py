@@ -7,7 +7,7 @@ put on an exact key is none to put on a wildcard that holds it.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Final
 
@@ -36,13 +36,20 @@ _PLAIN: Final = "every process of the router's own host"
 Rule = dict[str, Any]
 
 
-def write_router_config(path: str, out: str | None) -> str:
+def write_router_config(path: str, out: str | None, note: Callable[[str], None]) -> str:
     """Make the configuration of an access list; returns it, or where it was written.
+
+    Args:
+        path: of the access list.
+        out: file to write, if any.
+        note: is told what is allowed and may still be a mistake.
 
     Raises:
         SettingsError: the access list is wrong, or ``out`` cannot be written.
     """
     access = read_access(path)
+    for name, roles in roles_that_add_up(access):
+        note(f"{path}: certificate {name} has {len(roles)} roles, which add up: {', '.join(roles)}")
     text = router_text(access, Path(path).name)
     if out is None:
         return text
@@ -52,6 +59,15 @@ def write_router_config(path: str, out: str | None) -> str:
         raise SettingsError(f"{out}: cannot be written ({error.strerror})") from None
     count = len({grant.certificate for grant in access.access})
     return f"{out}: {len(access.machines)} machines, {count} certificates\n"
+
+
+def roles_that_add_up(access: AccessModel) -> list[tuple[str, list[str]]]:
+    """Certificates with more than one role, and their roles as they stand."""
+    roles: dict[str, list[str]] = {}
+    for grant in access.access:
+        if grant.role not in roles.setdefault(grant.certificate, []):
+            roles[grant.certificate].append(grant.role)
+    return [(name, found) for name, found in roles.items() if len(found) > 1]
 
 
 def router_text(access: AccessModel, source: str) -> str:

@@ -16,6 +16,7 @@ import re
 import sys
 import threading
 import time
+from collections.abc import Sequence
 from typing import Final, Literal, TextIO, TypeAlias
 
 LogFormat: TypeAlias = Literal["text", "json"]
@@ -134,11 +135,11 @@ def configure(form: LogFormat = "text", level: int = logging.INFO) -> None:
     root.setLevel(level)
 
 
-def complaint(text: str, form: LogFormat = "text") -> str:
-    """The last line of a command that cannot go on."""
+def complaint(lines: Sequence[str], form: LogFormat = "text") -> str:
+    """The last words of a command that cannot go on: a line each, or one object of all of them."""
     if form == "json":
-        return JsonLines().format(_record(logging.ERROR, text))
-    return f"rampe-guard: {text}"
+        return JsonLines().format(_record(logging.ERROR, "\n".join(lines)))
+    return "rampe-guard: " + "\n".join(map(one_line, lines))
 
 
 def _record(level: int, text: str) -> logging.LogRecord:

@@ -40,7 +40,7 @@ class Problems:
 
     def extend(self, error: SettingsError) -> None:
         """Take over the problems of another file."""
-        self._others.extend(str(error).splitlines())
+        self._others.extend(error.lines)
 
     def raise_if_any(self) -> None:
         """Raise all of them as one error, the first `MAX_REPORTED` in words.
@@ -56,7 +56,7 @@ class Problems:
         rest = len(lines) - len(shown)
         if rest:
             shown.append(f"{self._document.file}: and {rest} more")
-        raise SettingsError("\n".join(shown))
+        raise SettingsError(*shown)
 
 
 def dotted(path: KeyPath) -> str:

@@ -88,9 +88,9 @@ def read_bytes(
     try:
         file = Path(path)
         if file.is_dir():
-            raise SettingsError(f"{path}: is a directory; give a {what}")
+            raise SettingsError(f"{path}: is a directory; give {_a(what)}")
         if file.exists() and not file.is_file():
-            raise SettingsError(f"{path}: is not a regular file; give a {what}")
+            raise SettingsError(f"{path}: is not a regular file; give {_a(what)}")
         with file.open("rb") as stream:
             content = stream.read(limit + 1)
     except FileNotFoundError:
@@ -99,8 +99,13 @@ def read_bytes(
         reason = getattr(error, "strerror", None) or error
         raise SettingsError(f"{show(str(path))}: cannot be read ({reason}); {hint}") from None
     if len(content) > limit:
-        raise SettingsError(f"{path}: is larger than {limit // 1024 // 1024} MB; give a {what}")
+        most = f"{limit // 1024 // 1024} MB"
+        raise SettingsError(f"{path}: is larger than {most}; give {_a(what)}")
     return content
+
+
+def _a(what: str) -> str:
+    return f"an {what}" if what[0] in "aeiou" else f"a {what}"
 
 
 def parse(content: bytes | str, file: str) -> Document:

@@ -54,6 +54,22 @@ def test_a_site_that_is_not_there_ends_with_2(
     assert "Traceback" not in done.stderr
 
 
+def test_an_error_of_one_line_stays_one(tmp_path: Path) -> None:
+    done = called("check", tmp_path / "no\npe\x1b[2J.yaml")
+    assert done.returncode == 2
+    assert done.stderr.startswith(
+        f"rampe-guard: {tmp_path}/no\\x0ape\\x1b[2J.yaml: there is no such"
+    )
+    assert done.stderr.count("\n") == 1
+    text = BENCH.read_text("utf-8").replace("max_velocity: 0.95", "max_velocity: fast\n      x: 1")
+    broken = tmp_path / "two\nlines.yaml"
+    broken.write_text(text, "utf-8")
+    done = called("check", broken)  # two problems are two lines
+    lines = done.stderr.splitlines()
+    assert len(lines) == 2
+    assert all("two\\x0alines.yaml:" in line for line in lines)
+
+
 def test_a_broken_site_is_told_by_file_line_and_key(tmp_path: Path) -> None:
     text = BENCH.read_text("utf-8").replace("max_velocity: 0.95", "max_velocity: fast")
     broken = tmp_path / "broken.yaml"

@@ -169,11 +169,16 @@ def test_what_is_wrong_is_said(old: str, new: str, told: str) -> None:
 
 def test_zenoh_takes_what_is_made_of_the_example(tmp_path: Path) -> None:
     out = tmp_path / "router.json5"
-    assert write_router_config(str(EXAMPLE), str(out)) == f"{out}: 1 machines, 7 certificates\n"
+    notes: list[str] = []
+    assert (
+        write_router_config(str(EXAMPLE), str(out), notes.append)
+        == f"{out}: 1 machines, 7 certificates\n"
+    )
     taken = zenoh.Config.from_file(out)
     rules = json.loads(taken.get_json("access_control/rules"))
     assert {key for rule in rules for key in rule["key_exprs"]} >= {f"{BASE}/ack", f"{BASE}/alert"}
-    assert write_router_config(str(EXAMPLE), None) == out.read_text()
+    assert write_router_config(str(EXAMPLE), None, notes.append) == out.read_text()
+    assert notes == []
 
 
 def test_the_command_says_what_is_wrong(tmp_path: Path) -> None:
@@ -184,3 +189,16 @@ def test_the_command_says_what_is_wrong(tmp_path: Path) -> None:
     done = called("access", EXAMPLE, "--out", tmp_path / "no" / "such")
     assert done.returncode == 2
     assert "cannot be written (No such file or directory)" in done.stderr
+    assert "is a directory; give an access list" in called("access", tmp_path).stderr
+
+
+def test_roles_of_one_certificate_add_up_and_that_is_told(tmp_path: Path) -> None:
+    file = tmp_path / "access.yaml"
+    more = "  - {certificate: one, role: viewer}\n  - {certificate: two, role: viewer}\n"
+    more += "  - {certificate: one, role: machine, machines: [a]}\n"
+    file.write_text(TEXT.replace("ROLE", "viewer") + more)
+    done = called("access", file)
+    assert done.returncode == 0
+    assert done.stderr == (
+        f"note: {file}: certificate one has 2 roles, which add up: viewer, machine\n"
+    )

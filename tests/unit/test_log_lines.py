@@ -66,8 +66,9 @@ def test_json_says_what_fields_it_was_given() -> None:
     assert told[0]["fields"] == {"zone": "wall", "time_to_collision_s": 0.4, "link": None}
     assert told[1]["fields"] == {"kind": "joystick:bad_json", "reason": "bad_json"}
     assert told[1]["time"].endswith("Z")
-    assert "fields" not in json.loads(complaint("no router", "json"))
-    assert complaint("no router") == "rampe-guard: no router"
+    assert "fields" not in json.loads(complaint(["no router"], "json"))
+    assert complaint(["no router"]) == "rampe-guard: no router"
+    assert complaint(["no\npe", "\x1b[2J"]) == "rampe-guard: no\\x0ape\n\\x1b[2J"
 
 
 def test_a_traceback_stays_within_its_json_line() -> None:

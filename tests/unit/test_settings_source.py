@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 
 import pytest
 
@@ -104,3 +105,9 @@ def test_paths_and_values_are_shown_on_one_line() -> None:
     assert len(show("x" * 500)) == 48
     assert did_you_mean("zzz", ["a", "b"]) == "known here: 'a', 'b'"
     assert did_you_mean("a", []) == "none is known here"
+
+
+def test_several_problems_stay_several_on_their_way_to_another_process() -> None:
+    error = pickle.loads(pickle.dumps(SettingsError("a\nb: wrong", "c: wrong")))  # noqa: S301
+    assert error.lines == ("a\nb: wrong", "c: wrong")
+    assert str(error) == "a\nb: wrong\nc: wrong"
