@@ -32,6 +32,7 @@ _JITTER_S = 0.1
 """Stamps and positions tremble by about what the object does in this time."""
 _STILL_M, _STILL_S, _STILL_RAD = 0.02, 0.02, 0.005
 """An object stands while its poses stay this near each other: [m], way at top speed [s], [rad]."""
+_CLOCKS = "the actuators by their stamps: taken as contact; do both come from one clock?"
 _SETTLED_S = 2.0
 _SEEN_S = 0.5
 
@@ -136,14 +137,11 @@ class MovingObject:
             text = f"no good pose of {where} yet: taken as contact"
         elif now_s - newest.arrival_s <= self._timeout_s:
             late_s = newest.arrival_s - self._measured_s
-            code, differ = "object_late", f"{late_s:.1f} s behind"
+            poses = f"the poses of {where} are"
             if self._early_s is not None:
-                code, differ = "object_early", f"{self._early_s:.1f} s ahead of"
-            text = (
-                f"the poses of {where} are {differ} the actuators by their stamps:"
-                " taken as contact; do both come from one clock?"
-            )
-            return Reason(code, None, text, self.key)
+                text = f"{poses} {self._early_s:.1f} s ahead of {_CLOCKS}"
+                return Reason("object_early", None, text, self.key)
+            return Reason("object_late", None, f"{poses} {late_s:.1f} s behind {_CLOCKS}", self.key)
         else:
             limit = f"{self._timeout_s:g} s"
             text = f"no good pose of {where} for more than {limit}: taken as contact"
