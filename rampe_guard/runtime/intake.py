@@ -48,6 +48,8 @@ class Stream:
     def take(self, now_s: float) -> tuple[list[Message], int]:
         """What is looked at, oldest first, and how many messages are not (at least)."""
         waiting = self._inbox.drain()
+        if not waiting:  # as nearly always
+            return waiting, 0
         lost = self._inbox.overruns - self._overruns
         self._overruns += lost
         # what was put on a wildcard is refused unread, and takes nothing from the budget
