@@ -1,9 +1,9 @@
 """Is the machine switched off? What its enable key says, held against what the machine does.
 
-Only a fresh, explicit "off" counts. No message, an old one, a refused one or one that is stamped
-ahead of the machine's clock (nobody knows how old it is) reads as on: then the guard watches, and
-says what is wrong with the key. Signs of life are a lever that is pushed
-and an actuator that moves. While they last, the machine is not off, whatever it says:
+Only a fresh, explicit "off" counts. No message, an old one, a refused one or one whose sender's
+clock is ahead of the machine's (nobody knows how old it is) reads as on: then the guard watches,
+and says what is wrong with the key. Signs of life are a lever that is pushed and an actuator that
+moves. While they last, the machine is not off, whatever it says:
 
 - for a second after the word they are the end of the work (an arm that runs out), and the guard
   watches on until they have ceased;
@@ -55,6 +55,7 @@ class EnableKey:
         self._start_s = start_s
         self._word: EnabledSample | None = None
         self._said_s = _NEVER
+        self._own = SenderClock()
         self._early_s: float | None = None
         self._off_since_s: float | None = None
         self._anchor: tuple[float, FloatArray] | None = None
@@ -64,6 +65,10 @@ class EnableKey:
     def take(self, sample: EnabledSample) -> Accepted[EnabledSample] | Fault:
         """Take a message, or tell why it was refused; "on" is believed however it is stamped."""
         verdict = self._gate.check(sample)
+        if isinstance(verdict, Accepted):
+            if verdict.restarted:
+                self._own.restart()
+            self._own.follow(sample.stamp_s, sample.arrival_s, stamped=sample.stamped)
         if sample.enabled:
             verdict = Accepted(sample)
         if isinstance(verdict, Fault):
@@ -72,7 +77,7 @@ class EnableKey:
         self._word, self._said_s, self._early_s = sample, sample.arrival_s, None
         if sample.stamped and not sample.enabled:
             self._said_s = self._clock.measured_s(sample.stamp_s, sample.arrival_s)
-            self._early_s = self._clock.early_s(sample.stamp_s, sample.arrival_s)
+            self._early_s = self._clock.early_s(self._own)
         return verdict
 
     def refused(self) -> None:

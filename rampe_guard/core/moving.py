@@ -7,8 +7,8 @@ Each has a key on which its pose comes. At any time every point of it lies withi
 of where that pose puts it, if no point of it is faster than ``max_speed`` and the pose was
 measured when its stamp says. The first is checked by the way from pose to pose, the second
 against the machine's own stamps; either breach degrades the status by name. Before the first
-pose, once the newest is older than the object's time-out, and while it is stamped ahead of the
-machine's clock (its age cannot be known then), its placement is None: the sweep answers "unknown",
+pose, once the newest is older than the object's time-out, and while its sender's clock is ahead of
+the machine's (its age cannot be known then), its placement is None: the sweep answers "unknown",
 which the alarm logic takes as contact.
 """
 
@@ -51,6 +51,7 @@ class MovingObject:
         self._gate = Continuity[ObjectSample](item.timeout_s, config.max_stamp_jump_s)
         self._newest: ObjectSample | None = None
         self._measured_s = 0.0
+        self._own = SenderClock()
         self._early_s: float | None = None
         self._anchor: FloatArray | None = None
         self._moved_s = 0.0
@@ -72,11 +73,14 @@ class MovingObject:
             return verdict
         if self._newest is not None and not verdict.restarted:
             self._check_speed(self._newest, sample)
+        if verdict.restarted:
+            self._own.restart()
         self._newest = sample
         self._measured_s, self._early_s = sample.arrival_s, None
         if sample.stamped:
             self._measured_s = clock.measured_s(sample.stamp_s, sample.arrival_s)
-            self._early_s = clock.early_s(sample.stamp_s, sample.arrival_s)
+            self._own.follow(sample.stamp_s, sample.arrival_s)
+            self._early_s = clock.early_s(self._own)
         self._accepted += 1
         if self._anchor is None or self._left(self._anchor, sample.pose):
             self._anchor, self._moved_s = sample.pose, sample.arrival_s

@@ -3,8 +3,8 @@
 All senders stamp with one clock, whose distance from ours nobody knows. The machine's positions
 show it: the freshest of them is not older than it looks. A message whose stamp lags behind
 that clock is as old as its stamp says, however late it came; one that does not lag is as old as
-its arrival says. One that is stamped well ahead of that clock was stamped by another one: how long
-it was under way, nobody can tell.
+its arrival says. A sender whose freshest message is stamped well ahead of that clock has another
+one: how long any message of it was under way, nobody can tell.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ differ by more are not to be told from clocks that differ [s]."""
 
 
 class SenderClock:
-    """How far the senders' clock is ahead of ours, as the freshest message shows it."""
+    """How far a sender's clock is ahead of ours, as its freshest message shows it."""
 
     def __init__(self) -> None:
         self._ahead_s: float | None = None
         self._at_s = 0.0
 
     def follow(self, stamp_s: float, arrival_s: float, *, stamped: bool = True) -> None:
-        """Take an accepted message of the machine; without a stamp of its own it tells nothing."""
+        """Take an accepted message; without a stamp of its own it tells nothing."""
         if not stamped:
             return
         ahead_s = stamp_s - arrival_s
@@ -34,7 +34,7 @@ class SenderClock:
         self._ahead_s, self._at_s = ahead_s, arrival_s
 
     def restart(self) -> None:
-        """The machine's clock was set anew."""
+        """The clock was set anew."""
         self._ahead_s = None
 
     def measured_s(self, stamp_s: float, arrival_s: float) -> float:
@@ -43,11 +43,14 @@ class SenderClock:
             return arrival_s
         return min(arrival_s, stamp_s - self._ahead_s)
 
-    def early_s(self, stamp_s: float, arrival_s: float) -> float | None:
-        """How far a stamp is ahead of the machine's [s], if further than one clock allows."""
-        if self._ahead_s is None:
+    def early_s(self, other: SenderClock) -> float | None:
+        """How far another sender's clock is ahead [s], if further than one and the same can be.
+
+        A message that was delayed does not hide it: the freshest one counts.
+        """
+        if self._ahead_s is None or other._ahead_s is None:
             return None
-        early_s = stamp_s - arrival_s - self._ahead_s
+        early_s = other._ahead_s - self._ahead_s
         # while the machine is silent its clock runs on, and may run away from ours
-        allowed_s = _SPREAD_S + _DRIFT * max(arrival_s - self._at_s, 0.0)
+        allowed_s = _SPREAD_S + _DRIFT * max(other._at_s - self._at_s, 0.0)
         return early_s if early_s > allowed_s else None

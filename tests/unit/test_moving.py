@@ -183,16 +183,38 @@ def test_the_first_pose_of_all_may_not_come_from_the_future_either() -> None:
     assert take(moving, seen(8.0, AHEAD_S + 10.4, 10.0)) == []
     assert moving.placements(10.0) == {"truck": None}
     assert codes(moving, 10.0) == ["object_early"]
-    take(moving, seen(8.0, AHEAD_S + 10.5, 10.5))
-    assert placed(moving, 10.5).grown_m == 0.0
+
+
+def test_a_clock_that_was_seen_ahead_makes_no_delayed_pose_young() -> None:
+    moving = objects()
+    for k in range(20):  # two seconds ahead at first; then its poses wait two seconds on their way
+        now_s = 10.0 + 0.1 * k
+        moving.follow(arm(AHEAD_S + now_s, now_s), restarted=False)
+        early_s = 2.0 if k < 5 else 2.0 - 0.05 * (k - 5)
+        assert take(moving, seen(8.0, AHEAD_S + now_s + early_s, now_s)) == []
+        assert moving.placements(now_s) == {"truck": None}
+        assert codes(moving, now_s) == ["object_early"]
+
+
+def test_a_clock_that_was_set_right_is_believed_again() -> None:
+    moving = objects()
+    for k in range(40):
+        now_s = 10.0 + 0.125 * k
+        moving.follow(arm(AHEAD_S + now_s, now_s), restarted=False)
+        take(moving, seen(8.0, AHEAD_S + now_s + (5.0 if k < 20 else 0.0), now_s))
+        assert (moving.placements(now_s)["truck"] is None) is (k < 28)  # refused for its time-out
 
 
 def test_a_machine_that_fell_silent_is_no_exact_clock() -> None:
-    clock = SenderClock()
-    clock.follow(AHEAD_S + 10.0, 10.0)
-    assert clock.early_s(AHEAD_S + 10.31, 10.0) == pytest.approx(0.31)
-    assert clock.early_s(AHEAD_S + 1010.31, 1010.0) is None  # 0.3 s after 17 minutes
-    assert clock.early_s(AHEAD_S + 1011.5, 1010.0) == pytest.approx(1.5)
+    def early_s(stamp_s: float, arrival_s: float) -> float | None:
+        clock, other = SenderClock(), SenderClock()
+        clock.follow(AHEAD_S + 10.0, 10.0)
+        other.follow(AHEAD_S + stamp_s, arrival_s)
+        return clock.early_s(other)
+
+    assert early_s(10.31, 10.0) == pytest.approx(0.31)
+    assert early_s(1010.31, 1010.0) is None  # 0.3 s after 17 minutes
+    assert early_s(1011.5, 1010.0) == pytest.approx(1.5)
 
 
 def test_without_a_stamp_the_arrival_counts() -> None:
