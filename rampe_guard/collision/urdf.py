@@ -77,7 +77,7 @@ def load_arm(description: ArmDescription) -> Arm:
         GeometryError: naming the file, joint or mesh and the reason.
     """
     path = Path(description.urdf)
-    robot = _parse(path)
+    robot = read_urdf(path)
     joints: dict[str, Any] = {joint.name: joint for joint in robot.joints}
     maps = _joint_maps(description, joints, path)
     limits = _limits(description, joints, path)
@@ -102,7 +102,7 @@ def load_arm(description: ArmDescription) -> Arm:
     )
 
 
-def _parse(path: Path) -> Tree:
+def read_urdf(path: Path) -> Tree:
     if not path.is_file():
         raise GeometryError(f"{path}: no such URDF file")
     try:
@@ -320,7 +320,7 @@ def _link_mesh(link: Any, path: Path, folders: Folders | None) -> TriangleMesh |
 def _shape_mesh(geometry: Any, link: str, path: Path, folders: Folders | None) -> TriangleMesh:
     where = f"{path}: link '{link}'"
     if geometry.mesh is not None:
-        file = _mesh_file(str(geometry.mesh.filename), path, folders)
+        file = mesh_file(str(geometry.mesh.filename), path, folders)
         scale = 1.0 if geometry.mesh.scale is None else np.asarray(geometry.mesh.scale, dtype=float)
         if not (np.isfinite(scale).all() and np.all(scale != 0.0)):
             raise GeometryError(f"{where}: mesh {file} has scale {scale}")
@@ -343,7 +343,7 @@ def _shape_mesh(geometry: Any, link: str, path: Path, folders: Folders | None) -
     return ball_mesh(sizes[0]) if len(sizes) == 1 else prism_mesh(sizes[0], sizes[1])
 
 
-def _mesh_file(name: str, urdf: Path, folders: Folders | None) -> Path:
+def mesh_file(name: str, urdf: Path, folders: Folders | None) -> Path:
     """Find a mesh: beside the URDF, or for package://NAME/REST in or above its folder.
 
     Raises:

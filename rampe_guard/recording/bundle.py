@@ -14,8 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Final
 
-from rampe_guard.collision.urdf import _mesh_file as mesh_file
-from rampe_guard.collision.urdf import _parse as read_urdf
+from rampe_guard.collision.urdf import mesh_file, read_urdf
 from rampe_guard.core.scene import Mesh
 from rampe_guard.errors import LogError
 from rampe_guard.settings import Site
