@@ -103,6 +103,11 @@ def load_arm(description: ArmDescription) -> Arm:
 
 
 def read_urdf(path: Path) -> Tree:
+    """Links and joints as the file has them.
+
+    Raises:
+        GeometryError: there is no such file, or it is no URDF.
+    """
     if not path.is_file():
         raise GeometryError(f"{path}: no such URDF file")
     try:
