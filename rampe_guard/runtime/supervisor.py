@@ -173,7 +173,7 @@ def _words(code: int) -> tuple[str, str]:
 
 def _say(text: str, log_format: LogFormat) -> None:
     with contextlib.suppress(OSError):  # nobody reads it any more: no reason to stop guarding
-        print(complaint(text, log_format), file=sys.stderr, flush=True)  # noqa: T201
+        print(complaint((text,), log_format), file=sys.stderr, flush=True)  # noqa: T201
 
 
 def restarted_after() -> str | None:
