@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
 from typing import Final
 
-from rampe_guard import wire
 from rampe_guard.core.scene import Scene
-from rampe_guard.errors import ConnectionFailedError, RampeGuardError
+from rampe_guard.errors import RampeGuardError
+from rampe_guard.runtime.scene_asked import fetch_scene
 from rampe_guard.runtime.zenoh_io import Bus
-from rampe_guard.settings import Site, load_scene_text
+from rampe_guard.settings import Site
 
 _AGAIN_S: Final = 2.0
 _ANSWER_S: Final = 1.0
@@ -46,7 +45,7 @@ class SceneFollower:
             self.trouble = "the guard's scene is not the one that is shown"
         self._asked = wanted_hash, now_s
         try:
-            self.scene = self._fetched(bus)
+            self.scene, _ = fetch_scene(bus, self._site, _ANSWER_S)
         except RampeGuardError as error:
             self.trouble = f"the guard's scene cannot be shown: {error}"
             return False
@@ -55,11 +54,3 @@ class SceneFollower:
         else:
             self.trouble = ""
         return True
-
-    def _fetched(self, bus: Bus) -> Scene:
-        answers = bus.ask(f"{self._site.keys.base}/scene", timeout_s=_ANSWER_S)
-        if not answers:
-            raise ConnectionFailedError("nobody answers")
-        told = wire.decode(answers[0], wire.SceneInForce)
-        scene = load_scene_text(told.scene or "", self._site, name="the guard's scene")
-        return replace(scene, path=self._site.scene.path)

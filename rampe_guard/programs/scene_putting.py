@@ -11,8 +11,9 @@ from pathlib import Path
 
 from rampe_guard import wire
 from rampe_guard.client.order import unanswered
-from rampe_guard.errors import ConnectionFailedError, MessageError, SettingsError
+from rampe_guard.errors import ConnectionFailedError, SettingsError
 from rampe_guard.runtime.connecting import connect_to
+from rampe_guard.runtime.scene_asked import ask_scene
 from rampe_guard.runtime.zenoh_io import Bus
 from rampe_guard.settings import Site, load_scene_text, load_site
 from rampe_guard.settings.source import read_bytes
@@ -89,15 +90,11 @@ def _in_force(site: Site, wish: wire.ScenePut) -> wire.SceneInForce:
 
 
 def _asked(site: Site, word: str, payload: bytes | None, timeout_s: float) -> wire.SceneInForce:
-    key = f"{site.keys.base}/{word}"
     with Bus.open(site.zenoh) as bus:
-        answers = bus.ask(key, payload, timeout_s)
-    if not answers:
-        raise UnansweredError(unanswered(key))
-    try:
-        return wire.decode(answers[0], wire.SceneInForce)
-    except MessageError as error:
-        raise ConnectionFailedError(f"{key} answered what is no scene: {error}") from None
+        found = ask_scene(bus, site, word, payload, timeout_s)
+    if found is None:
+        raise UnansweredError(unanswered(f"{site.keys.base}/{word}"))
+    return found
 
 
 def _facts(found: wire.SceneInForce, site: Site) -> str:

@@ -6,12 +6,12 @@ import threading
 from dataclasses import replace
 from typing import Final
 
-from rampe_guard import wire
 from rampe_guard.errors import ConnectionFailedError, RampeGuardError
 from rampe_guard.recording.bundle import Bundle, gather
 from rampe_guard.runtime.say import Sayer
+from rampe_guard.runtime.scene_asked import fetch_scene
 from rampe_guard.runtime.zenoh_io import Bus
-from rampe_guard.settings import Site, load_scene_text
+from rampe_guard.settings import Site
 
 _ANSWER_S: Final = 2.0
 
@@ -66,13 +66,8 @@ class SceneWatch:
         return True
 
     def _fetched(self, bus: Bus) -> tuple[Site, Bundle]:
-        answers = bus.ask(f"{self._own.keys.base}/scene", timeout_s=_ANSWER_S)
-        if not answers:
-            raise ConnectionFailedError("nobody answers")
-        told = wire.decode(answers[0], wire.SceneInForce)
-        text = told.scene or ""
-        scene = load_scene_text(text, self._own, name="the guard's scene")
-        site = replace(self._own, scene=replace(scene, path=self._own.scene.path))
+        scene, told = fetch_scene(bus, self._own, _ANSWER_S)
         if scene.content_hash != told.scene_hash:
             raise ConnectionFailedError("its meshes are others than here")
-        return site, gather(site, text)
+        site = replace(self._own, scene=scene)
+        return site, gather(site, told.scene)

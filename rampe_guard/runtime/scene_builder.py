@@ -17,9 +17,9 @@ from typing import Final
 from rampe_guard.collision import FclSweeper
 from rampe_guard.core.scene import Mesh
 from rampe_guard.errors import RampeGuardError, RefusedError
-from rampe_guard.runtime.scene_kept import SceneKeeper, SceneText, read_scene
+from rampe_guard.runtime.scene_kept import SceneKeeper, SceneText
 from rampe_guard.runtime.scene_trial import try_scene
-from rampe_guard.settings import Site
+from rampe_guard.settings import Site, load_scene_text
 
 _LONG: Final = 32 * 1024
 """Longer texts take more than a moment to read [characters]."""
@@ -94,7 +94,7 @@ class SceneBuilder:
         tried = len(text) > _LONG
         if tried:
             self._trial(self._site.path, text)
-        scene = read_scene(text, self._site)
+        scene = load_scene_text(text, self._site)
         if not tried and any(isinstance(item, Mesh) for item in scene.objects):
             self._trial(self._site.path, text)
         source = SceneText(scene, text, who, unix_s)

@@ -7,7 +7,7 @@ in every heartbeat, since the scene that then holds is not the one that somebody
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -61,12 +61,7 @@ def own_scene(site: Site) -> SceneText:
         SettingsError: it cannot be read any more, or is wrong now.
     """
     content = read_bytes(site.scene.path, "scene file")
-    return SceneText(read_scene(content, site), content.decode("utf-8"))
-
-
-def read_scene(text: bytes | str, site: Site) -> Scene:
-    """A scene in the place of the site's own; `SettingsError` tells of every problem."""
-    return replace(load_scene_text(text, site), path=site.scene.path)
+    return SceneText(load_scene_text(content, site), content.decode("utf-8"))
 
 
 class SceneKeeper:
@@ -110,7 +105,7 @@ class SceneKeeper:
             if kept.instead_of != self._own_hash:
                 self._say.info(f"the scene that {who} put gives way to a newer scene file")
                 return own
-            scene = read_scene(kept.text, self._site)
+            scene = load_scene_text(kept.text, self._site)
         except RampeGuardError as error:
             return self.give_up(who, error)
         self._say.info(f"the scene is the one that {who} put", put_by=who)

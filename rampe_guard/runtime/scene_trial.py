@@ -14,8 +14,7 @@ from typing import Final
 
 from rampe_guard.assembly import load_machine
 from rampe_guard.errors import GeometryError, RampeGuardError
-from rampe_guard.runtime.scene_kept import read_scene
-from rampe_guard.settings import load_site
+from rampe_guard.settings import load_scene_text, load_site
 
 LONGEST_S: Final = 300.0
 """A scene that takes longer to build is refused."""
@@ -52,7 +51,7 @@ def main() -> int:
     """Build it here."""
     try:
         site = load_site(sys.argv[1])
-        load_machine(replace(site, scene=read_scene(sys.stdin.read(), site)))
+        load_machine(replace(site, scene=load_scene_text(sys.stdin.read(), site)))
     except RampeGuardError as error:
         print(error, file=sys.stderr)  # noqa: T201 - whoever started it reads it
         return _REFUSED

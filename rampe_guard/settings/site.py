@@ -261,7 +261,7 @@ def load_scene_text(text: bytes | str, site: Site, name: str = "<scene>") -> Sce
     Raises:
         SettingsError: with line, key, value and remedy of every problem.
     """
-    return parse_scene(
+    scene = parse_scene(
         text,
         actuators=site.actuator_names,
         taken=site.keys.used(),
@@ -269,6 +269,7 @@ def load_scene_text(text: bytes | str, site: Site, name: str = "<scene>") -> Sce
         name=name,
         folders=site.folders,
     )
+    return replace(scene, path=site.scene.path)
 
 
 def for_operator(site: Site, name: str | None) -> Site:

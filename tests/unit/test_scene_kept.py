@@ -14,10 +14,9 @@ from rampe_guard.runtime.scene_kept import (
     SceneKeeper,
     SceneText,
     own_scene,
-    read_scene,
 )
 from rampe_guard.runtime.store import model_folder
-from rampe_guard.settings import Site, load_site
+from rampe_guard.settings import Site, load_scene_text, load_site
 from tests.support.processes import BENCH, ROOT
 
 OTHER = "objects:\n  - {name: fence, type: actuator_limit, actuator: swing, above: 1.2}\n"
@@ -42,7 +41,7 @@ def keeper(site: Site) -> SceneKeeper:
 
 
 def put(site: Site, text: str = OTHER) -> SceneText:
-    source = SceneText(read_scene(text, site), text, "ann", 5.0)
+    source = SceneText(load_scene_text(text, site), text, "ann", 5.0)
     assert keeper(site).keep(source)
     return source
 
@@ -100,13 +99,13 @@ def test_what_cannot_be_kept_is_told(site: Site) -> None:
     folder.parent.mkdir(parents=True)
     folder.write_text("in the way")
     stuck = keeper(site)
-    assert not stuck.keep(SceneText(read_scene(OTHER, site), OTHER, "ann", 5.0))
+    assert not stuck.keep(SceneText(load_scene_text(OTHER, site), OTHER, "ann", 5.0))
     assert (stuck.code, stuck.lost) == (NOT_KEPT, None)
     assert str(folder) in (stuck.problem or "")
 
 
 def test_without_memory_nothing_is_kept(site: Site) -> None:
     off = replace(site, memory=replace(site.memory, enabled=False))
-    assert not keeper(off).keep(SceneText(read_scene(OTHER, off), OTHER, "ann", 5.0))
+    assert not keeper(off).keep(SceneText(load_scene_text(OTHER, off), OTHER, "ann", 5.0))
     assert keeper(off).recall().put_by is None
     assert not model_folder(site).exists()
