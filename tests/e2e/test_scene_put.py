@@ -73,7 +73,7 @@ def test_another_scene_is_swept_at_once_and_alerts_of_the_old_one_end(live: Stat
     assert ended.body["quality"] == "good"
     beat = live.ears.wait("heartbeat", lambda _: True, 2.0, time.monotonic())
     assert beat.body["scene_hash"] == told["scene_hash"] != live.site.scene.content_hash
-    assert f"scene/put by {WHO}" in live.guard.err
+    until(lambda: f"scene/put by {WHO}" in live.guard.err, 5.0, "a line of the log")
     live.rig.stalled, live.rig.levers = False, HANDS_OFF
 
 
@@ -181,7 +181,11 @@ def test_what_was_learned_is_forgotten(live: Station) -> None:
     done = called("model", "reset", *args, "--running", "--who", WHO)
     assert done.returncode == 0, done.stderr
     assert "forgotten: operator 'operator'" in done.stdout
-    assert f"forget by {WHO}" in live.guard.err
+    until(
+        lambda: f"forget by {WHO}" in live.guard.err,
+        5.0,
+        "a line of the log, which a thread writes",
+    )
     start_s = time.monotonic()
     beat = live.ears.wait("heartbeat", lambda _: True, 2.0, start_s)
     assert beat.body["memory"]["situations"] < 20  # only what was seen since
