@@ -34,6 +34,8 @@ class Wall:
 
     at: float = 1.1
     answer: Certificate | None = None
+    name: str = "wall"
+    moving: bool = False  # objects that move may be there, far away
 
     def sweep(
         self,
@@ -48,9 +50,9 @@ class Wall:
     ) -> SweepResult:
         """Closed form."""
         assert not any_path
-        assert not placed
+        assert self.moving or not placed
         del clearance  # always sharp
-        if only is not None and "wall" not in only:
+        if only is not None and self.name not in only:
             return SweepResult(())
         edge = self.at - 0.1
         now, way = edge - float(start[0]), float(displacement[0])
@@ -58,7 +60,7 @@ class Wall:
         fraction = 0.0 if left <= 0 else left / way if way >= left > 0 else None
         kind = Certificate.FREE if fraction is None else Certificate.CONTACT
         near = max(now - max(way, 0.0), 0.0)
-        zone = ZoneSweep("wall", kind, fraction, "arm", None, near, now, way > 0, 0.1)
+        zone = ZoneSweep(self.name, kind, fraction, "arm", None, near, now, way > 0, 0.1)
         if self.answer is not None:
             zone = replace(zone, certificate=self.answer, contact_fraction=None, clearance_m=None)
         return SweepResult((zone,))

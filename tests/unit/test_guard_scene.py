@@ -2,41 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-
 import numpy as np
 
 from rampe_guard.core.alarm import Level, State
 from rampe_guard.core.scene import Sphere
-from rampe_guard.core.types import FloatArray, Inputs, ObjectSample, Placement, SweepResult
+from rampe_guard.core.types import Inputs, ObjectSample
 from tests.support.core_rig import CoreRig, Wall
 
 
-@dataclass
-class Named(Wall):
+def fence(at: float = 1.1, *, moving: bool = False) -> Wall:
     """The wall under another name."""
-
-    name: str = "fence"
-
-    def sweep(
-        self,
-        start: FloatArray,
-        displacement: FloatArray,
-        *,
-        any_path: bool = False,
-        clearance: bool = True,
-        wider_m: float = 0.0,
-        only: frozenset[str] | None = None,
-        placed: Mapping[str, Placement | None] | None = None,
-    ) -> SweepResult:
-        if only is not None and self.name not in only:
-            return SweepResult(())
-        del placed
-        found = Wall.sweep(
-            self, start, displacement, any_path=any_path, clearance=clearance, wider_m=wider_m
-        )
-        return SweepResult(tuple(replace(zone, zone=self.name) for zone in found.zones))
+    return Wall(at=at, name="fence", moving=moving)
 
 
 def at_rest() -> CoreRig:
@@ -63,7 +39,7 @@ def test_the_alert_of_a_wall_that_goes_ends_as_all_do() -> None:
     rig.hold(0.0, 0.1)
     raised = rig.alerts()[-1]
     assert raised.level is Level.IMMINENT
-    rig.guard.change_scene(Named(at=1.9), ["fence"])
+    rig.guard.change_scene(fence(at=1.9), ["fence"])
     assert [a.zone for a in rig.guard.snapshot(rig.now).alerts] == ["wall"]  # not gone silently
     rig.events.clear()
     rig.hold(0.0, 3.0)
@@ -81,7 +57,7 @@ def test_a_contact_with_a_wall_that_goes_still_waits_for_someone() -> None:
     rig = CoreRig()
     rig.hold(0.8, 1.6)  # into the wall itself
     assert rig.alerts()[-1].level is Level.IMMINENT
-    rig.guard.change_scene(Named(at=9.0), ["fence"])
+    rig.guard.change_scene(fence(at=9.0), ["fence"])
     rig.hold(0.0, 3.0)
     assert (rig.alerts()[-1].level, rig.alerts()[-1].state) == (Level.CLEAR, State.RTN_UNACKED)
     (waiting,) = rig.guard.snapshot(rig.now).alerts
@@ -94,7 +70,7 @@ def test_a_wall_that_comes_back_is_alarmed_anew() -> None:
     rig.hold(0.8, 1.3)
     rig.hold(0.0, 0.1)
     first = rig.alerts()[-1].alert_id
-    rig.guard.change_scene(Named(at=9.0), ["fence"])
+    rig.guard.change_scene(fence(at=9.0), ["fence"])
     rig.hold(0.0, 3.0)
     rig.guard.change_scene(Wall(), ["wall"])
     rig.hold(0.3, 0.1)
@@ -120,14 +96,14 @@ def placed(rig: CoreRig) -> bool:
 
 def test_an_object_that_stays_is_still_where_it_was_seen() -> None:
     rig = at_rest()
-    rig.guard.change_scene(Named(), ["fence"], [truck()])
+    rig.guard.change_scene(fence(moving=True), ["fence"], [truck()])
     assert not placed(rig)
     sample = ObjectSample("truck", np.eye(4), rig.now, rig.now, stamped=False)
     rig.guard.step(Inputs(objects=(sample,)), rig.now)
     assert placed(rig)
-    rig.guard.change_scene(Named(), ["fence"], [truck()])
+    rig.guard.change_scene(fence(moving=True), ["fence"], [truck()])
     assert placed(rig)
-    rig.guard.change_scene(Named(), ["fence"], [truck(max_speed=2.0)])  # by other rules
+    rig.guard.change_scene(fence(moving=True), ["fence"], [truck(max_speed=2.0)])  # by other rules
     assert not placed(rig)
 
 
