@@ -22,8 +22,10 @@ from rampe_guard.core.types import (
     ObjectSample,
 )
 from rampe_guard.errors import MessageError
+from rampe_guard.runtime.decoding import Decoders
 from rampe_guard.runtime.zenoh_queries import Message
 from rampe_guard.settings import Site
+from rampe_guard.settings.ros2_keys import why_strange
 
 Refused = Callable[[str, Message, MessageError], None]
 """Told of a refusal: a word for its kind, the message, and what is wrong with it."""
@@ -36,10 +38,12 @@ class Batch:
         site: whose keys, axes and actuators count.
         now_s: when it arrived, on the clock of the steps [s]; the stamp of what has none.
         refused: told of each refusal.
+        decoders: of joystick and actuators.
     """
 
-    def __init__(self, site: Site, now_s: float, refused: Refused) -> None:
+    def __init__(self, site: Site, now_s: float, refused: Refused, decoders: Decoders) -> None:
         self._site, self._now_s, self._tell = site, now_s, refused
+        self._decoders = decoders
         self._levers: list[JoystickSample] = []
         self._positions: list[ActuatorSample] = []
         self._words: list[EnabledSample] = []
@@ -51,7 +55,7 @@ class Batch:
         """Take what came for the joystick's key."""
         try:
             _exact(message, self._site.keys.joystick)
-            decoded = wire.decode_joystick(message.payload, self._site.guard.axes)
+            decoded = self._decoders.joystick(message.payload)
         except MessageError as error:
             self._refuse("joystick", message, error)
             return
@@ -64,7 +68,7 @@ class Batch:
         """Take what came for the actuators' key."""
         try:
             _exact(message, self._site.keys.actuators)
-            decoded = wire.decode_actuators(message.payload, self._site.actuator_names)
+            decoded = self._decoders.actuators(message.payload)
         except MessageError as error:
             self._refuse("actuators", message, error)
             return
@@ -86,6 +90,10 @@ class Batch:
         stamp_s = self._now_s if said.stamp is None else said.stamp
         stamped = said.stamp is not None
         self._words.append(EnabledSample(said.enabled, stamp_s, self._now_s, stamped=stamped))
+
+    def stranger(self, name: InputName, message: Message, key: str) -> None:
+        """Take what came on the topic of an input, but is another type's; ``key`` is right."""
+        self._refuse(name, message, MessageError(*why_strange(message.key, key)))
 
     def pose(self, name: str, key: str, message: Message) -> None:
         """Take what came for the ``key`` of the object ``name``."""

@@ -8,13 +8,16 @@ that computes wrongly is not to be trusted again until its process has started a
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from rampe_guard.assembly import Machine
 from rampe_guard.collision.canary import Canary
-from rampe_guard.errors import ConnectionFailedError, GeometryError, SettingsError
+from rampe_guard.errors import ConnectionFailedError, GeometryError
 from rampe_guard.runtime.canary_watch import CanaryWatch
 from rampe_guard.runtime.connecting import connect_to
+from rampe_guard.runtime.life import restarted_after
 from rampe_guard.runtime.loading import load_telling
 from rampe_guard.runtime.metrics_start import Show, served
 from rampe_guard.runtime.minders import Minders
@@ -24,10 +27,13 @@ from rampe_guard.runtime.scene_desk import Scenes
 from rampe_guard.runtime.scene_kept import SceneKeeper
 from rampe_guard.runtime.stopping import StopFlag
 from rampe_guard.runtime.store_keeper import Keeper
-from rampe_guard.runtime.supervisor import UNTRUSTED, restarted_after
+from rampe_guard.runtime.supervisor import UNTRUSTED
 from rampe_guard.runtime.worker import Worker
 from rampe_guard.runtime.zenoh_io import Bus, check_configuration
 from rampe_guard.settings import MetricsSettings, Site, for_operator, load_site
+
+if TYPE_CHECKING:
+    from rampe_guard.runtime.ros2_publisher import RosVoice
 
 
 def run(
@@ -56,10 +62,10 @@ def run(
     say, minders = Sayer("rampe_guard"), Minders()
     minders.waiting("loading")
     site = for_operator(connect_to(load_site(site_path), endpoints), operator)
-    if site.format != "json":
-        raise SettingsError(
-            f"{site.path}: format: {site.format!r} is not supported by this version; use json"
-        )
+    if site.ros2 is not None:
+        from rampe_guard.ros2.cdr import store  # noqa: PLC0415 - others start without it
+
+        store()  # before meshes are loaded: is the extra there?
     check_configuration(site.zenoh)  # before meshes are loaded, which takes a while
     where = MetricsSettings(*metrics) if metrics else site.metrics
     with served(where, say, again=restarted_after() is not None) as show:
@@ -82,15 +88,29 @@ def _guard(site: Site, stop: StopFlag, say: Sayer, minders: Minders, show: Show 
                 f"another guard already publishes under {site.keys.base}; stop it, or give this"
                 " machine a base key of its own"
             )
-        with Keeper(site, machine.arm.limits, say) as keeper, RunMarker(site, say) as marker:
+        with (
+            Keeper(site, machine.arm.limits, say) as keeper,
+            RunMarker(site, say) as marker,
+            _ros_voice(bus, machine, say) as voice,
+        ):
             watch = CanaryWatch(canary)
-            worker = Worker(machine, bus, say, keeper, watch, scenes, minders, marker, show=show)
+            worker = Worker(
+                machine, bus, say, keeper, watch, scenes, minders, marker, show=show, voice=voice
+            )
             say.info(f"guarding on {site.keys.base}")
             untrusted = worker.run(stop, stop.wait)
             marker.clean = not untrusted
             minders.ending()
     say.info("ended: the canary failed" if untrusted else "stopped")
     return UNTRUSTED if untrusted else 0
+
+
+def _ros_voice(bus: Bus, machine: Machine, say: Sayer) -> AbstractContextManager[RosVoice | None]:
+    if machine.site.ros2 is None:
+        return nullcontext()
+    from rampe_guard.runtime.ros2_publisher import ros_voice  # noqa: PLC0415 - as above
+
+    return ros_voice(bus, machine, say)
 
 
 def _load(site: Site, say: Sayer) -> tuple[Machine, Canary, Scenes]:

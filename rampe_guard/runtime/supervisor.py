@@ -7,6 +7,7 @@ nothing but the standard library. It
 * starts the guard anew after a death by a signal or an exit code that no command ends with on
   purpose, says of what it died, and tells the new one, which raises it as an alert;
 * kills it when its loop has not turned for ten seconds, which is a death like any other;
+* keeps a spare guard with its imports behind it, which takes the place of one that died;
 * passes on signals, waits for the end, and ends with the same code;
 * takes the guard with it when it dies itself.
 """
@@ -17,16 +18,16 @@ import contextlib
 import ctypes
 import os
 import signal
-import subprocess
 import sys
 import threading
 import time
 from collections.abc import Sequence
 from types import FrameType
 
+from rampe_guard.runtime.life import GRACE_S, LIFELINE, Life
 from rampe_guard.runtime.log_lines import LogFormat, complaint
 from rampe_guard.runtime.systemd import Watchdog
-from rampe_guard.runtime.turning import PERIOD_S, Listener
+from rampe_guard.runtime.turning import PERIOD_S
 
 UNTRUSTED = 3
 """Exit code of a guard whose canary failed."""
@@ -35,15 +36,9 @@ FINAL = (0, 2, 130)
 FIRST_DELAY_S, LONGEST_DELAY_S = 0.1, 10.0
 SHORT_LIFE_S = 10.0
 """A guard that dies younger makes the next one wait twice as long."""
-GRACE_S = 10.0
-"""A guard that was told to end and has not by then is killed."""
-LAST_WORDS_S = 1.0
-"""In which a guard that hangs can still say where, before it is killed."""
-
-RESTARTED = "RAMPE_GUARD_RESTARTED"
-"""Environment: what the guard before this one died of."""
-LIFELINE = "RAMPE_GUARD_LIFELINE"
-"""Environment: process id of the parent, and a file descriptor that closes with it."""
+SPARE_AFTER_S = 5.0
+"""A guard that has been at work for so long gets a spare one [s]: what begins needs the processor
+for itself."""
 _PASSED_ON = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 _PR_SET_PDEATHSIG = 1
 
@@ -57,6 +52,8 @@ class Supervisor:
         longest_delay_s: to which that is doubled after short lives [s].
         log_format: of what it says on stderr.
         look_s: ten looks of so long in a row without a turn of its loop are a hang [s].
+        spare_after_s: how long a guard is without a spare, which must be a command that awaits its
+            turn (`life.await_turn`) [s]; None: there never is one.
     """
 
     def __init__(
@@ -66,13 +63,16 @@ class Supervisor:
         longest_delay_s: float = LONGEST_DELAY_S,
         log_format: LogFormat = "text",
         look_s: float = PERIOD_S,
+        spare_after_s: float | None = None,
     ) -> None:
         self._log_format: LogFormat = log_format
         self._command = list(command)
         self._first_delay_s, self._longest_delay_s = first_delay_s, longest_delay_s
-        self._look_s = look_s
-        self._child: subprocess.Popen[bytes] | None = None
+        self._look_s, self._spare_after_s = look_s, spare_after_s
+        self._life: Life | None = None
+        self._spare: Life | None = None
         self._stopping = self._hung = False
+        self._alone_s = 0.0
         self._manager = Watchdog()
 
     def run(self) -> int:
@@ -81,6 +81,13 @@ class Supervisor:
             # what nohup has switched off stays off
             if signal.getsignal(number) is not signal.SIG_IGN:
                 signal.signal(number, self._pass_on)
+        try:
+            return self._keep_running()
+        finally:
+            if self._spare is not None:
+                self._spare.discard()
+
+    def _keep_running(self) -> int:
         delay_s, cause = self._first_delay_s, None
         while not self._stopping:
             began_s = time.monotonic()
@@ -100,58 +107,51 @@ class Supervisor:
         return 0
 
     def _live(self, cause: str | None) -> int:
-        """Start a guard and wait for its end; its exit code, negative for a signal."""
-        near, far = os.pipe()
-        listener = Listener(self._look_s)
-        environment = {**os.environ, LIFELINE: f"{os.getpid()} {near}"}
-        environment.pop(RESTARTED, None)
-        if cause is not None:
-            environment[RESTARTED] = cause
+        """Let a guard begin and wait for its end; its exit code, negative for a signal."""
+        life, self._spare = self._spare, None
+        if life is not None and (cause is None or not life.begin(cause)):
+            life.discard()
+            life = None
+        if life is None:
+            life = Life(self._command, self._look_s, cause, spare=False)
         try:
-            # a session of its own: what a terminal sends comes to this process alone, once
-            child = subprocess.Popen(  # noqa: S603 - our own command line
-                self._command,
-                env=listener.environment(environment),
-                pass_fds=(near, listener.far),
-                start_new_session=True,
-            )
-            self._child = child
-            listener.started()
+            self._life = life
             if self._stopping:  # a signal came before there was anyone to pass it on to
-                self._end(child)
-            self._hung = self._watch(child, listener)
-            return child.wait()
+                life.end()
+            self._hung = self._watch(life)
+            return life.wait()
         finally:
-            self._child = None
-            listener.close()
-            os.close(near)
-            os.close(far)
+            self._life = None
+            life.close()
 
-    def _watch(self, child: subprocess.Popen[bytes], listener: Listener) -> bool:
+    def _watch(self, life: Life) -> bool:
         """Until the guard's end, or until it hangs and is killed for that; whether it did."""
-        while child.poll() is None:
-            hangs = listener.hangs()
-            if hangs is None:
-                return False
+        while (hangs := life.look()) is not None:
             if hangs and not self._stopping:
-                child.send_signal(signal.SIGABRT)  # faulthandler says where it stands
-                with contextlib.suppress(subprocess.TimeoutExpired):
-                    child.wait(LAST_WORDS_S)
-                child.kill()
+                life.kill_hung()
                 return True
+            self._mind_spare(life, time.monotonic())
         return False
+
+    def _mind_spare(self, life: Life, now_s: float) -> None:
+        """Start a spare for a guard that has been at work without one for a while."""
+        if not life.guards:
+            self._alone_s = now_s
+        if self._spare is not None:
+            if self._spare.alive:
+                return
+            self._spare.discard()  # it was killed: its memory was needed, say
+            self._spare, self._alone_s = None, now_s
+        due = self._spare_after_s is not None and now_s - self._alone_s >= self._spare_after_s
+        if due and not self._stopping:
+            self._spare = Life(self._command, self._look_s, spare=True)
 
     def _pass_on(self, _signal: int, _frame: FrameType | None) -> None:
         self._stopping = True
-        if self._child is not None:
-            self._end(self._child)
-
-    def _end(self, child: subprocess.Popen[bytes]) -> None:
-        """SIGTERM for each of them: a guard ends by it cleanly, even before it has a handler."""
-        child.send_signal(signal.SIGTERM)
-        timer = threading.Timer(GRACE_S, child.kill)
-        timer.daemon = True
-        timer.start()
+        if self._spare is not None:
+            self._spare.kill()  # it may be loading: what ends needs the processor
+        if self._life is not None:
+            self._life.end()
 
     def _wait(self, seconds: float) -> None:
         until_s = time.monotonic() + seconds
@@ -174,11 +174,6 @@ def _words(code: int) -> tuple[str, str]:
 def _say(text: str, log_format: LogFormat) -> None:
     with contextlib.suppress(OSError):  # nobody reads it any more: no reason to stop guarding
         print(complaint((text,), log_format), file=sys.stderr, flush=True)  # noqa: T201
-
-
-def restarted_after() -> str | None:
-    """In a guard: what the one before it died of."""
-    return os.environ.get(RESTARTED)
 
 
 def end_with_parent() -> None:

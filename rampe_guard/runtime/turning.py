@@ -54,12 +54,16 @@ class Turning:
 
 
 class Listener:
-    """The supervisor's end, for one life of a guard."""
+    """The supervisor's end, for one life of a guard.
+
+    Attributes:
+        turning: its loop has turned at least once.
+    """
 
     def __init__(self, period_s: float = PERIOD_S, looks: int = HANG_LOOKS) -> None:
         self._period_s, self._looks = period_s, looks
         self._near, self.far = os.pipe()
-        self._turning = self._over = False
+        self.turning = self._over = False
         self._missed = 0
 
     def environment(self, base: Mapping[str, str]) -> dict[str, str]:
@@ -74,14 +78,14 @@ class Listener:
     def hangs(self) -> bool | None:
         """Listen for a while: whether the guard hangs; None when its end of the pipe is closed."""
         if not select.select([self._near], [], [], self._period_s)[0]:
-            watched = self._turning and not self._over
+            watched = self.turning and not self._over
             self._missed = self._missed + 1 if watched else 0
             return self._missed >= self._looks
         words = os.read(self._near, 4096)
         if not words:
             return None
         self._missed = 0
-        self._turning = True
+        self.turning = True
         self._over = self._over or _END in words
         return False
 

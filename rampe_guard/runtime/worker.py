@@ -16,18 +16,21 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from rampe_guard import wire
 from rampe_guard.assembly import Machine
-from rampe_guard.core.events import AlertEvent, Event, PredictionEvent
+from rampe_guard.core.events import AdviceEvent, AlertEvent, Event, PredictionEvent
 from rampe_guard.core.rampe import Rampe
 from rampe_guard.core.situation_memory import SituationMemory
 from rampe_guard.core.types import Inputs
 from rampe_guard.runtime.audit import Audit
 from rampe_guard.runtime.canary_watch import CanaryWatch
+from rampe_guard.runtime.decoding import decoders_of
 from rampe_guard.runtime.expiry import Expiry
 from rampe_guard.runtime.health import Own, Pulse, TimedSweeper
 from rampe_guard.runtime.intake import Intake
+from rampe_guard.runtime.life import restarted_after
 from rampe_guard.runtime.messages import Scribe
 from rampe_guard.runtime.metrics_start import Show
 from rampe_guard.runtime.minders import Minders
@@ -38,8 +41,10 @@ from rampe_guard.runtime.say import Sayer
 from rampe_guard.runtime.scene_builder import Built
 from rampe_guard.runtime.scene_desk import SceneDesk, Scenes
 from rampe_guard.runtime.store_keeper import Keeper
-from rampe_guard.runtime.supervisor import restarted_after
 from rampe_guard.runtime.zenoh_io import Bus
+
+if TYPE_CHECKING:
+    from rampe_guard.runtime.ros2_publisher import RosVoice
 
 _WAKE_S = 0.002
 """Sleep between looks at the inboxes: adds half of it to the latency, costs 3 % of a core."""
@@ -69,6 +74,7 @@ class Worker:
         minders: are told that the loop turns, and how the guard is.
         marker: knows how the run before ended, and keeps what nobody has seen.
         show: takes heartbeats for metrics.
+        voice: tells tools of ROS 2.
     """
 
     def __init__(
@@ -83,6 +89,7 @@ class Worker:
         marker: RunMarker,
         *,
         show: Show | None = None,
+        voice: RosVoice | None = None,
     ) -> None:
         site = machine.site
         base = site.keys.base
@@ -92,13 +99,19 @@ class Worker:
         self._scribe = Scribe(site, boot, _unix_s)
         self._pulse = Pulse(site, boot, start_s, _unix_s, site.scene.content_hash)
         timed = TimedSweeper(machine.sweeper, self._pulse.sweep_ms)
-        self._guard = machine.guard(start_s, boot, timed)
+        self._guard = machine.guard(start_s, boot, timed, advise=True)
         self._keeper, self._canary, self._marker, self._show = keeper, canary, marker, show
+        self._voice = voice
         self._restarted = _cause(marker.after(restarted_after()), scenes.keeper.lost)
         keeper.begin(self._guard.rampe, start_s, self._guard.situations)
-        self._intake = Intake(bus, site, say)
+        self._intake = Intake(bus, site, say, decoders_of(site, machine.arm.limits))
         self._alerts = bus.outbox(f"{base}/alert", "rampe.alert.v1", urgent=True)
         self._predictions = bus.outbox(f"{base}/prediction", "rampe.prediction.v1")
+        self._advice = (
+            bus.outbox(f"{base}/advice", "rampe.advice.v1", urgent=True)
+            if site.guard.advice.enabled
+            else None
+        )
         self._beats = bus.outbox(f"{base}/heartbeat", "rampe.heartbeat.v1", urgent=True)
         self._states = bus.desk(f"{base}/state")
         audit = self._audit = Audit(say)
@@ -161,6 +174,9 @@ class Worker:
         elif isinstance(event, PredictionEvent):
             self._prediction = self._scribe.prediction(event)
             self._predictions.put(wire.encode(self._prediction))
+        elif isinstance(event, AdviceEvent):
+            if self._advice is not None:
+                self._advice.put(wire.encode(self._scribe.advice(event)))
         else:
             kind = f"{event.input}:{event.reason}"
             self._say.warn(kind, f"{event.input}: refused: {event.reason}: {event.detail}")
@@ -207,6 +223,9 @@ class Worker:
         self._beats.put(wire.encode(self._heartbeat))
         if self._show is not None:
             self._show(self._heartbeat, self._pulse, now_s)
+        if self._voice is not None:
+            state = self._scribe.state(self._heartbeat, snapshot, self._prediction)
+            self._voice.tell(state, self._intake.lost_on_the_way)
         if connected is not self._connected:
             self._connected = connected
             self._say.info("Zenoh router is back" if connected else "Zenoh router is gone")
@@ -242,6 +261,8 @@ class Worker:
         timed = TimedSweeper(built.sweeper, self._pulse.sweep_ms)
         self._guard.change_scene(timed, built.sweeper.zones, scene.moving)
         self._intake.change_objects(scene.moving)
+        if self._voice is not None:
+            self._voice.change_scene(scene)
         self._pulse.scene_hash = scene.content_hash
         self._step(Inputs(), time.monotonic())
 

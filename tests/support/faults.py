@@ -221,10 +221,10 @@ FAULTS = (
     ),
     Fault(
         "guard frozen",
-        "not trusted after 1 s; back within 1 s of its thaw",
+        "not trusted after 1 s; back within 2 s of its thaw",
         guard_frozen,
         seconds=3.0,
-        back_s=1.0,
+        back_s=2.0,
     ),
     Fault(
         "input publisher dies",
@@ -235,10 +235,10 @@ FAULTS = (
     ),
     Fault(
         "input publisher freezes",
-        "not monitoring after its time-out; back within 1 s",
+        "not monitoring after its time-out; back within 2 s",
         machine_freezes,
         seconds=3.0,
-        back_s=1.0,
+        back_s=2.0,
     ),
     Fault(
         "inputs flood (10 kHz)",
@@ -250,7 +250,7 @@ FAULTS = (
     ),
     Fault(
         "the same message again and again",
-        "not monitoring after its time-out; back within 1 s",
+        "not monitoring after 0.2 s; back within 1 s",
         _stream("repeat"),
         seconds=3.0,
         back_s=1.0,
@@ -265,7 +265,7 @@ FAULTS = (
     ),
     Fault(
         "stamps jump by an hour and back",
-        "not monitoring after a time-out; back within 2 s",
+        "not monitoring after 0.2 s; back within 2 s",
         clock_jumps,
         seconds=3.0,
         back_s=2.0,

@@ -20,6 +20,7 @@ from typing import Self, TypeVar
 from unittest import mock
 
 from rampe_guard.cli import main
+from rampe_guard.runtime.life import GUARD_NAME
 
 T = TypeVar("T")
 
@@ -142,34 +143,44 @@ class Process:
         self.close()
 
 
-def router(folder: Path, endpoint: str) -> Process:
-    """A router that listens when this returns."""
-    process = Process(folder, "router", ["-m", "rampe_guard.runtime.router", endpoint])
+def started(process: Process, word: str, within_s: float = START_S) -> Process:
+    """It, once it has said ``word``; if it does not, it is ended."""
     try:
-        process.wait_for("ready")
+        process.wait_for(word, within_s)
     except BaseException:
         process.close()
         raise
     return process
+
+
+def router(folder: Path, endpoint: str) -> Process:
+    """A router that listens when this returns."""
+    args = ["-m", "rampe_guard.runtime.router", endpoint]
+    return started(Process(folder, "router", args), "ready")
 
 
 def guard(folder: Path, site: Path, endpoint: str, *more: str) -> Process:
     """A guard that works when this returns; ``more`` are options of ``run``."""
     args = ["-m", "rampe_guard", "run", str(site), "--connect", endpoint, *more]
-    process = Process(folder, "guard", args)
-    try:
-        process.wait_for("guarding on")
-    except BaseException:
-        process.close()
-        raise
-    return process
+    return started(Process(folder, "guard", args), "guarding on")
 
 
 def guarding(process: Process) -> int:
-    """Pid of the process that guards, below the supervisor that ``run`` is."""
+    """Pid of the process that guards, below the supervisor that ``run`` is; not of a spare."""
 
-    (pid,) = until(lambda: children(process), 5.0, f"a guard below pid {process.pid}")
+    def found() -> list[int]:
+        return [pid for pid in children(process) if _name(pid) == GUARD_NAME]
+
+    (pid,) = until(found, 5.0, f"a guard below pid {process.pid}")
     return pid
+
+
+def _name(pid: int) -> str:
+    """What lists of processes call it; empty if it is gone."""
+    try:
+        return Path(f"/proc/{pid}/comm").read_text("utf-8").strip()
+    except OSError:
+        return ""
 
 
 def kill_guard(process: Process) -> None:

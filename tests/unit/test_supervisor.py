@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from rampe_guard.runtime.life import GUARD_NAME, SPARE_NAME
 from tests.support.processes import Process, children, living_pid, until
 
 SUPERVISE = """
@@ -19,7 +20,8 @@ sys.exit(Supervisor(command, first_delay_s=0.05, longest_delay_s=0.15, look_s=0.
 """
 COUNT = """
 import os, pathlib, signal, sys, time
-from rampe_guard.runtime.supervisor import end_with_parent, restarted_after
+from rampe_guard.runtime.life import restarted_after
+from rampe_guard.runtime.supervisor import end_with_parent
 folder = pathlib.Path(sys.argv[1])
 life = len(list(folder.glob("life-*")))
 (folder / f"life-{life}").write_text(f"{os.getpid()} {restarted_after()}")
@@ -211,3 +213,95 @@ def test_it_loads_nothing_that_may_crash(tmp_path: Path) -> None:
     with Process(tmp_path, "imports", ["-c", program]) as done:
         assert done.popen.wait(20.0) == 0
         assert done.out.strip() == "set()"
+
+
+SPARE = """
+import signal, sys
+from rampe_guard.runtime.supervisor import Supervisor
+command = [sys.executable, "-c", sys.argv[1], *sys.argv[2:]]
+sys.exit(
+    Supervisor(
+        command, first_delay_s=0.05, longest_delay_s=0.1, look_s=0.05, spare_after_s=0.2
+    ).run()
+)
+"""
+TAKES_TURNS = """
+import os, pathlib, signal, sys, time
+from rampe_guard.runtime.life import await_turn, restarted_after, take_name
+from rampe_guard.runtime.supervisor import end_with_parent
+from rampe_guard.runtime.turning import Turning
+folder = pathlib.Path(sys.argv[1])
+stop = []
+signal.signal(signal.SIGTERM, lambda *_: stop.append(1))
+take_name()
+end_with_parent()
+if not await_turn(lambda: bool(stop)):
+    sys.exit(0)
+life = len(list(folder.glob("life-*")))
+(folder / f"life-{life}").write_text(f"{os.getpid()} {restarted_after()}")
+turning, turns = Turning(), 0
+while not stop:
+    turning.feed(float(turns := turns + 1))
+    time.sleep(0.01)
+"""
+
+
+def named(parent: Process) -> dict[str, int]:
+    """Processes below a supervisor, by what lists of processes call them."""
+    found = {}
+    for pid in children(parent):
+        name = Path(f"/proc/{pid}/comm").read_text("utf-8").strip()
+        if name in {SPARE_NAME, GUARD_NAME}:
+            found[name] = pid
+    return found
+
+
+def both(parent: Process, apart_from: int | None = None) -> dict[str, int]:
+    def there() -> dict[str, int] | None:
+        found = named(parent)
+        return found if len(found) == 2 and found.get(GUARD_NAME) != apart_from else None
+
+    return until(there, 20.0, "a guard and a spare")
+
+
+def test_a_spare_takes_the_place_of_a_guard_that_dies(tmp_path: Path) -> None:
+    with Process(tmp_path, "supervisor", ["-c", SPARE, TAKES_TURNS, tmp_path]) as parent:
+        for _ in range(2):
+            before = both(parent)
+            os.kill(before[GUARD_NAME], signal.SIGKILL)
+            after = both(parent, apart_from=before[GUARD_NAME])
+            assert after[GUARD_NAME] == before[SPARE_NAME]
+        family = children(parent)
+        assert parent.signal_and_wait(signal.SIGTERM) < 5.0
+    assert lives(tmp_path) == ["None", "a crash (SIGKILL)", "a crash (SIGKILL)"]
+    assert not [pid for pid in family if living_pid(pid)]
+
+
+def test_a_spare_that_was_killed_is_replaced(tmp_path: Path) -> None:
+    with Process(tmp_path, "supervisor", ["-c", SPARE, TAKES_TURNS, tmp_path]) as parent:
+        before = both(parent)
+        os.kill(before[SPARE_NAME], signal.SIGKILL)
+        until(lambda: before[SPARE_NAME] not in children(parent), 20.0, "an end of the spare")
+        after = both(parent)
+        assert after[GUARD_NAME] == before[GUARD_NAME]
+        parent.signal_and_wait(signal.SIGTERM)
+    assert lives(tmp_path) == ["None"]
+
+
+def test_a_spare_ends_with_its_supervisor_however_that_dies(tmp_path: Path) -> None:
+    with Process(tmp_path, "supervisor", ["-c", SPARE, TAKES_TURNS, tmp_path]) as parent:
+        family = both(parent)
+        parent.popen.kill()
+        until(lambda: not any(living_pid(pid) for pid in family.values()), 20.0, "an end of both")
+
+
+def test_a_spare_that_does_not_wake_is_not_waited_for(tmp_path: Path) -> None:
+    with Process(tmp_path, "supervisor", ["-c", SPARE, TAKES_TURNS, tmp_path]) as parent:
+        before = both(parent)
+        os.kill(before[SPARE_NAME], signal.SIGSTOP)
+        os.kill(before[GUARD_NAME], signal.SIGKILL)
+        after = both(parent, apart_from=before[GUARD_NAME])
+        assert before[SPARE_NAME] not in after.values()
+        parent.signal_and_wait(signal.SIGTERM)
+    assert lives(tmp_path) == ["None", "a crash (SIGKILL)"]
+    assert not living_pid(before[SPARE_NAME])
