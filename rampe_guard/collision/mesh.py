@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from rampe_guard.collision.mesh_read import MAX_TRIANGLES, read_mesh, refuse_too_many
+from rampe_guard.collision.mesh_limits import MAX_TRIANGLES, refuse_too_many
+from rampe_guard.collision.mesh_read import read_mesh
 from rampe_guard.collision.mesh_repair import (
     first_of_equal,
     oriented,
@@ -199,7 +200,7 @@ def load_mesh(file: str | Path, scale: FloatArray | None = None) -> TriangleMesh
     """
     path = Path(file)
     raw = read_mesh(path)
-    vertices, faces, notes = raw.vertices, raw.faces, []
+    vertices, faces, notes = raw.vertices, raw.faces, [f"{path}: {note}" for note in raw.notes]
     if raw.unit_m is not None and raw.unit_m != 1.0:
         vertices = vertices * raw.unit_m
         notes.append(f"{path}: the file's unit is {raw.unit_m:g} m: taken to metres")

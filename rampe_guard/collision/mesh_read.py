@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import io
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
+from urllib.parse import unquote
 
 import numpy as np
 
+from rampe_guard.collision.mesh_dae import read_dae
+from rampe_guard.collision.mesh_gltf import check_gltf, companions
+from rampe_guard.collision.mesh_limits import MAX_BYTES, refuse_too_many
 from rampe_guard.collision.mesh_topology import IntArray
 from rampe_guard.collision.xml_check import check_xml
 from rampe_guard.errors import GeometryError
@@ -17,13 +22,10 @@ if TYPE_CHECKING:
 
     from rampe_guard.core.types import FloatArray
 
-FORMATS = (".stl", ".obj", ".ply", ".dae", ".off", ".glb")
-"""All whole in one file; none of their readers runs anything."""
-_WITH_MATERIALS = ("obj", "ply", "glb")
+FORMATS = (".stl", ".obj", ".ply", ".dae", ".off", ".glb", ".gltf")
+"""Whole in one file, but for the buffers of glTF; none of their readers runs anything."""
+_WITH_MATERIALS = ("obj", "ply", "glb", "gltf")
 """Their pictures and colours are no use here, and pictures may unfold to any size."""
-MAX_TRIANGLES = 2_000_000
-MAX_BYTES = 2**30
-"""Larger files are refused unread: two million triangles need half of it in the wordiest format."""
 
 _STL_HEADER = 84
 _STL_TRIANGLE = np.dtype(
@@ -45,11 +47,13 @@ class RawMesh:
         vertices: (v, 3) in the file's unit.
         faces: (f, 3), as they stand there.
         unit_m: the file's unit [m]; None where the format or the file does not name one.
+        notes: remarks on how it was read.
     """
 
     vertices: FloatArray
     faces: IntArray
     unit_m: float | None = None
+    notes: tuple[str, ...] = ()
 
 
 def read_mesh(path: Path) -> RawMesh:
@@ -64,32 +68,17 @@ def read_mesh(path: Path) -> RawMesh:
         raise GeometryError(
             f"{path}: is none of {', '.join(FORMATS)} by its ending; export it as one of them"
         )
-    size = path.stat().st_size
+    beside, size = _whole(path)
     if size > MAX_BYTES:
         raise GeometryError(
             f"{path}: {size / 2**20:.0f} MiB; more than {MAX_BYTES // 2**20} MiB are refused,"
             " simplify it"
         )
     try:
-        if path.suffix.lower() == ".stl":
-            raw = _binary_stl(path, size)
-            if raw is not None:
-                return raw
-        import trimesh  # noqa: PLC0415  # half a second, which our own formats need not wait for
-
-        # trimesh cannot say how many there are before it has read them all
-        kind = path.suffix.lower().removeprefix(".")
-        plain = {"skip_materials": True} if kind in _WITH_MATERIALS else {}
-        with path.open("rb") as file:
-            if kind == "dae":
-                check_xml(file, str(path))
-                file.seek(0)
-            scene = trimesh.load_scene(
-                file, file_type=kind, resolver=_NoOther(), process=False, **plain
-            )
-        loaded = scene.to_mesh()
-        vertices, faces = np.asarray(loaded.vertices, float), np.asarray(loaded.faces, np.int64)
-        return RawMesh(vertices, faces, _unit(scene))
+        raw = _binary_stl(path, size) if path.suffix.lower() == ".stl" else None
+        if raw is not None:
+            return raw
+        return _dae(path) if path.suffix.lower() == ".dae" else _by_trimesh(path, beside)
     except GeometryError as error:
         said = str(error)
         if said.startswith(str(path)):
@@ -99,27 +88,64 @@ def read_mesh(path: Path) -> RawMesh:
         raise GeometryError(f"{path}: cannot be read as a mesh: {error}") from error
 
 
+def _whole(path: Path) -> tuple[tuple[Path, ...], int]:
+    """The files beside it that it needs, and the size of all [bytes]."""
+    try:
+        beside = companions(path)
+        return beside, sum(file.stat().st_size for file in (path, *beside))
+    except OSError as error:
+        which = error.filename or path
+        raise GeometryError(f"{path}: {which} cannot be read: {error.strerror}") from None
+    except (AttributeError, TypeError, ValueError) as error:
+        raise GeometryError(f"{path}: is no glTF: {error}") from None
+
+
+def _dae(path: Path) -> RawMesh:
+    content = path.read_bytes()
+    check_xml(io.BytesIO(content), str(path))
+    vertices, faces, unit, notes = read_dae(content)
+    good = unit is not None and np.isfinite(unit) and unit > 0.0
+    return RawMesh(vertices, faces, unit if good else None, notes)
+
+
+def _by_trimesh(path: Path, beside: tuple[Path, ...]) -> RawMesh:
+    import trimesh  # noqa: PLC0415  # half a second, which our own formats need not wait for
+
+    # trimesh cannot say how many there are before it has read them all
+    kind = path.suffix.lower().removeprefix(".")
+    if kind in ("glb", "gltf"):
+        check_gltf(path)
+    plain = {"skip_materials": True} if kind in _WITH_MATERIALS else {}
+    with path.open("rb") as file:
+        scene = trimesh.load_scene(
+            file, file_type=kind, resolver=_NoOther(path, beside), process=False, **plain
+        )
+    loaded = scene.to_mesh()
+    vertices, faces = np.asarray(loaded.vertices, float), np.asarray(loaded.faces, np.int64)
+    return RawMesh(vertices, faces, _unit(scene))
+
+
 class _NoOther(dict[str, bytes]):
-    """In the place of trimesh's resolvers, which would open files beside the mesh, or fetch."""
+    """In the place of trimesh's resolvers, which would open files beside the mesh, or fetch.
+
+    Args:
+        path: the mesh file.
+        beside: the only other files that are read.
+    """
+
+    def __init__(self, path: Path, beside: tuple[Path, ...]) -> None:
+        super().__init__()
+        self._folder, self._beside = path.parent, beside
 
     def __missing__(self, name: str) -> bytes:
+        file = self._folder / unquote(name)
+        if file in self._beside:
+            return file.read_bytes()
         raise GeometryError(f"it names another file, {name[:80]!r}; export it whole in one file")
 
     def get(self, name: str, default: object = None) -> bytes:  # noqa: ARG002
-        """As above: nothing is there."""
+        """As above: nothing else is there."""
         return self[name]
-
-
-def refuse_too_many(triangles: int, name: str) -> None:
-    """Refuse a mesh of more than MAX_TRIANGLES.
-
-    Raises:
-        GeometryError: naming ``name`` and the number.
-    """
-    if triangles > MAX_TRIANGLES:
-        raise GeometryError(
-            f"{name}: {triangles} triangles; more than {MAX_TRIANGLES} are refused, simplify it"
-        )
 
 
 def _binary_stl(path: Path, size: int) -> RawMesh | None:

@@ -22,6 +22,7 @@ import numpy as np
 from rampe_guard.collision import mesh as meshes
 from rampe_guard.collision import tree_build, tree_split
 from rampe_guard.collision.mesh import TriangleMesh, check_extent, load_mesh
+from rampe_guard.collision.mesh_gltf import companions
 from rampe_guard.collision.mesh_read import FORMATS
 from rampe_guard.collision.shape import Shape, shape_of
 from rampe_guard.collision.shape_file import MAGIC, BrokenShapeError, read_shape, write_shape
@@ -233,13 +234,15 @@ def cached_shape(
 
 
 def _file_key(path: Path, factors: FloatArray) -> str | None:
-    """What names the shape of a file: its bytes, its kind, its scale and our version."""
+    """What names the shape of a file: all bytes of it, its kind, its scale and our version."""
     if path.suffix.lower() not in FORMATS:
         return None  # reading it will say why
     try:
-        with path.open("rb") as file:
-            content = hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError:  # reading it will say why
+        content = ""
+        for part in (path, *companions(path)):
+            with part.open("rb") as file:
+                content += hashlib.file_digest(file, "sha256").hexdigest()
+    except (OSError, GeometryError):  # reading it will say why
         return None
     scale = " ".join(factor.hex() for factor in factors.tolist())
     said = f"{_MADE_BY} file {content} {path.suffix.lower()} scale {scale}"

@@ -108,7 +108,10 @@ def dae(before: str, inside: str = "") -> str:
         ("a.dae", dae(LAUGHS), "has a document type"),
         ("a.dae", dae(OUTSIDE), "has a document type"),
         ("a.dae", dae("", "<a>" * 1000 + "</a>" * 1000), "nested deeper"),
-        ("a.gltf", '{"asset": {"version": "2.0"}}', "is none of .stl"),
+        ("a.gltf", '{"asset": {"version": "2.0"}}', "no triangles"),
+        ("a.gltf", "[]", "is no glTF"),
+        ("a.gltf", '{"buffers": 7}', "is no glTF"),
+        ("a.gltf", "[" * 100_000, "is no glTF"),
         ("a.zip", "PK", "is none of .stl"),
         ("a.npz", "PK", "is none of .stl"),
         ("a.pkl", "cos\nsystem\n(S'touch PWNED'\ntR.", "is none of .stl"),
@@ -139,17 +142,7 @@ def test_a_mesh_opens_no_other_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize("uri", ["secret.bin", "http://127.0.0.1:1/x.bin", "../../etc/passwd"])
 def test_a_glb_has_all_of_itself(tmp_path: Path, uri: str) -> None:
     (tmp_path / "secret.bin").write_bytes(b"\0" * 100)
-    gltf = {
-        "asset": {"version": "2.0"},
-        "buffers": [{"byteLength": 36, "uri": uri}],
-        "bufferViews": [{"buffer": 0, "byteLength": 36}],
-        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
-        "nodes": [{"mesh": 0}],
-        "scenes": [{"nodes": [0]}],
-        "scene": 0,
-    }
-    text = json.dumps(gltf).encode()
+    text = json.dumps(gltf({"byteLength": 36, "uri": uri})).encode()
     text += b" " * (-len(text) % 4)
     head = struct.pack("<4sIII4s", b"glTF", 2, 20 + len(text), len(text), b"JSON")
     (tmp_path / "a.glb").write_bytes(head + text)
@@ -159,6 +152,48 @@ def test_a_glb_has_all_of_itself(tmp_path: Path, uri: str) -> None:
             load_mesh(tmp_path / "a.glb")
 
     assert files_opened(load, tmp_path) == {"a.glb"}
+
+
+@pytest.mark.parametrize(
+    "uri",
+    [
+        "../secret.bin",
+        "%2e%2e/secret.bin",
+        "link.bin",
+        "/etc/hostname",
+        "file:///etc/hostname",
+        "http://127.0.0.1:1/x.bin",
+        "a%00b",
+        "gone.bin",
+    ],
+)
+def test_buffers_of_a_gltf_lie_below_its_own_folder(tmp_path: Path, uri: str) -> None:
+    (tmp_path / "secret.bin").write_bytes(b"\0" * 36)
+    folder = tmp_path / "meshes"
+    folder.mkdir()
+    (folder / "link.bin").symlink_to(tmp_path / "secret.bin")
+    (folder / "a.gltf").write_text(json.dumps(gltf({"byteLength": 36, "uri": uri})))
+
+    def load() -> None:
+        with pytest.raises(GeometryError, match=r"a\.gltf: ") as caught:
+            load_mesh(folder / "a.gltf")
+        assert Path("/etc/hostname").read_text().strip() not in str(caught.value)
+
+    assert files_opened(load, tmp_path) == {"a.gltf"}
+
+
+def gltf(buffer: dict[str, object]) -> dict[str, object]:
+    """One triangle, its numbers in one buffer."""
+    return {
+        "asset": {"version": "2.0"},
+        "buffers": [buffer],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "nodes": [{"mesh": 0}],
+        "scenes": [{"nodes": [0]}],
+        "scene": 0,
+    }
 
 
 def files_opened(act: Callable[[], object], folder: Path) -> set[str]:
@@ -182,7 +217,11 @@ def test_each_of_the_formats_is_read_all_the_same(tmp_path: Path, suffix: str) -
     if suffix == ".dae":
         pytest.importorskip("collada")
     data = trimesh.creation.box((1.0, 2.0, 3.0)).export(file_type=suffix[1:])
-    file.write_bytes(data.encode() if isinstance(data, str) else data)
+    if isinstance(data, dict):  # the glTF, and its buffers beside it
+        for name, part in data.items():
+            (tmp_path / name.replace("model", "cube")).write_bytes(part)
+    else:
+        file.write_bytes(data.encode() if isinstance(data, str) else data)
     assert np.ptp(load_mesh(file).vertices, axis=0) == pytest.approx([1.0, 2.0, 3.0])
 
 

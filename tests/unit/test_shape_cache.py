@@ -289,14 +289,19 @@ def test_bad_files_and_scales_are_refused_not_kept(tmp_path: Path) -> None:
     assert len(list((tmp_path / "cache").iterdir())) == 1
 
 
-def test_formats_that_refer_to_other_files_are_refused(tmp_path: Path) -> None:
+def test_a_gltf_that_is_not_all_there_is_kept_nowhere(tmp_path: Path) -> None:
     cache = ShapeCache(tmp_path / "cache")
     exported = trimesh.creation.box().export(file_type="gltf")
     for name, data in exported.items():
         (tmp_path / name).write_bytes(data)
-    with pytest.raises(GeometryError, match=r"model\.gltf: is none of \.stl, .*export it"):
+    gone = tmp_path / min(name for name in exported if name.endswith(".bin"))
+    content = gone.read_bytes()
+    gone.unlink()
+    with pytest.raises(GeometryError, match=rf"model\.gltf: .*{gone.name} cannot be read"):
         load_shape(tmp_path / "model.gltf", cache=cache)
     assert not (tmp_path / "cache").exists()
+    gone.write_bytes(content)
+    assert load_shape(tmp_path / "model.gltf", cache=cache).triangles == 12
 
 
 def test_progress_is_told_of_both_ways(tmp_path: Path) -> None:
