@@ -1,0 +1,82 @@
+"""Options of ``init`` and ``check``."""
+
+from __future__ import annotations
+
+import argparse
+
+from rampe_guard.options import add_site, positive
+
+
+def add_init(parser: argparse.ArgumentParser) -> None:
+    """A URDF, a look at the machine, and where the files go."""
+    parser.add_argument("urdf", help="URDF of the arm")
+    parser.add_argument("--out", required=True, metavar="FOLDER", help="for the files made")
+    parser.add_argument("--site", default="my-site", metavar="NAME", help="(default my-site)")
+    parser.add_argument("--machine", default="", metavar="NAME", help="(default: of the URDF)")
+    source = parser.add_argument_group("measure the machine from a recording, or live")
+    source.add_argument("--log", metavar="FILE", help="recording (MCAP), or a CSV log")
+    source.add_argument(
+        "--connect", action="append", default=[], metavar="ENDPOINT", help="listen on it, live"
+    )
+    source.add_argument("--zenoh", metavar="FILE", help="Zenoh configuration file instead (json5)")
+    source.add_argument(
+        "--plain-network",
+        action="store_true",
+        help="accept that anyone on the network of --connect can read and forge messages",
+    )
+    text = "key of the joystick; of a CSV log its columns, in the order of the axes"
+    source.add_argument("--joystick", metavar="KEY", help=f"{text}: NAME[:SCALE[:OFFSET]],…")
+    text = "key of the actuators; of a CSV log the columns of the positions"
+    source.add_argument("--actuators", metavar="KEY", help=f"{text}, written the same way")
+    source.add_argument("--time", metavar="COLUMN", help="of a CSV log; COLUMN:SCALE makes it [s]")
+    source.add_argument(
+        "--seconds", type=positive, default=60.0, help="for how long to listen live (default 60)"
+    )
+    arm = parser.add_argument_group("what messages do not say")
+    arm.add_argument(
+        "--joints",
+        type=names,
+        default=(),
+        metavar="A,B",
+        help="joints of the URDF in the order of the positions (default: by name, or the URDF's)",
+    )
+    arm.add_argument("--names", type=names, default=(), metavar="A,B", help="of the actuators")
+    arm.add_argument(
+        "--cylinder",
+        action="append",
+        default=[],
+        dest="cylinders",
+        metavar="NAME=BASE,ROD,LENGTH[,ANGLE[,DIRECTION]]",
+        help="the actuator NAME is a hydraulic cylinder: base_m, rod_m, length_at_zero_m,"
+        " angle_offset_rad, direction of its drive",
+    )
+    arm.add_argument(
+        "--package-dir",
+        action="append",
+        default=[],
+        dest="package_dirs",
+        metavar="FOLDER",
+        help="where package:// meshes are looked for",
+    )
+    parser.add_argument("--yes", action="store_true", help="ask nothing, even on a terminal")
+    parser.add_argument("--force", action="store_true", help="write over what is there")
+
+
+def add_check(parser: argparse.ArgumentParser) -> None:
+    """A site file, and how deep to look."""
+    add_site(parser, connect=True)
+    text = "draw the arm among its zones: PNG, SVG or PDF (needs the extra [eval])"
+    parser.add_argument("--picture", metavar="FILE", help=text)
+    text = "also hear the machine: rates, ages, clocks, refusals, and signs against the site file"
+    parser.add_argument("--live", action="store_true", help=text)
+    parser.add_argument(
+        "--seconds", type=positive, default=5.0, help="for how long, with --live (default 5)"
+    )
+
+
+def names(text: str) -> tuple[str, ...]:
+    """Names with commas between them."""
+    found = tuple(part.strip() for part in text.split(","))
+    if not all(found):
+        raise argparse.ArgumentTypeError(f"{text!r} has an empty name")
+    return found

@@ -1,0 +1,115 @@
+"""What ``rampe-guard init`` measures from, and what it keeps of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from rampe_guard.core.identify import Measured
+from rampe_guard.errors import LogError, SettingsError
+from rampe_guard.programs.initing_plan import ActuatorPlan, Said
+from rampe_guard.programs.initing_wishes import Wishes
+from rampe_guard.programs.measuring import Heard, heard_in_file, reasons
+from rampe_guard.programs.measuring_bag import heard_in_bag
+from rampe_guard.programs.measuring_csv import heard_in_csv
+from rampe_guard.programs.measuring_live import Listening, heard_live, write_csv
+from rampe_guard.recording import is_mcap
+from rampe_guard.recording.bag import is_bag
+from rampe_guard.runtime.connecting import Network
+from rampe_guard.runtime.stopping import StopFlag
+from rampe_guard.settings import ColumnMap
+
+MEASURED = "measured.csv"
+"""What was heard live, for `replay`."""
+_TELL_S = 10.0
+_USUAL_TIMEOUT_S, _LONGEST_TIMEOUT_S = 0.5, 2.0
+_RARE = 0.999
+
+
+def heard_by(
+    wishes: Wishes, joints: Sequence[str], console: Console, stop: StopFlag
+) -> Heard | None:
+    """What there is to measure from; None if nothing was named. ``joints`` are those of the URDF.
+
+    Raises:
+        LogError, SettingsError, ConnectionFailedError: it cannot be had.
+    """
+    if wishes.log is not None:
+        return _of_file(wishes, joints, wishes.log)
+    if not wishes.connect and wishes.zenoh is None:
+        return None
+    if wishes.joystick is None or wishes.actuators is None:
+        raise SettingsError("to measure live, give --joystick KEY and --actuators KEY")
+    console.print(
+        f"listening for {wishes.seconds:g} s on {wishes.joystick} and {wishes.actuators}:\n"
+        "move each lever in turn, both ways, fully and gently, and let go each time"
+    )
+    told = [_TELL_S]
+
+    def tell(passed_s: float, streams: list[Listening]) -> None:
+        if passed_s >= told[0]:
+            told[0] += _TELL_S
+            counts = ", ".join(f"{len(one.messages)} on {one.key}" for one in streams)
+            console.print(f"  {passed_s:.0f} s: {counts}")
+
+    network = Network(wishes.connect, wishes.zenoh, wishes.plain_network)
+    return heard_live(network, wishes.joystick, wishes.actuators, wishes.seconds, stop, tell)
+
+
+def _of_file(wishes: Wishes, joints: Sequence[str], path: str) -> Heard:
+    if is_bag(path):
+        wanted = wishes.joints or joints
+        return heard_in_bag(path, wishes.joystick, wishes.actuators, wanted)
+    if is_mcap(path):
+        return heard_in_file(path, wishes.joystick, wishes.actuators)
+    return heard_in_csv(path, wishes.time, wishes.joystick, wishes.actuators)
+
+
+def tell_heard(heard: Heard, measured: Sequence[Measured], console: Console) -> None:
+    """What was heard, in a line.
+
+    Raises:
+        LogError: it is too short to measure anything.
+    """
+    traces = heard.traces
+    console.print(
+        f"{heard.origin}: {len(traces.lever_s)} levers with {traces.axes.shape[1]} axes,"
+        f" {len(traces.time_s)} positions of {traces.position.shape[1]} actuators in"
+        f" {heard.seconds:.0f} s{reasons(heard.refused)}",
+        highlight=False,
+    )
+    if not measured:
+        raise LogError(f"{heard.origin}: is too short; both inputs must be there for some seconds")
+
+
+def kept_log(
+    folder: Path, heard: Heard, plans: Sequence[ActuatorPlan], live: bool
+) -> dict[str, Any] | None:
+    """Columns for the site file's ``log``; what was heard live is written as a CSV log."""
+    if heard.columns is not None:
+        columns: dict[str, Any] = dict(heard.columns)
+        columns["joystick"] = [heard.columns["joystick"][plan.axis.value] for plan in plans]
+        return columns
+    if not live:
+        return None
+    names = [plan.name for plan in plans]
+    write_csv(folder / MEASURED, heard, names, [plan.axis.value for plan in plans])
+    return {
+        "time": ColumnMap("t"),
+        "joystick": [ColumnMap(f"u_{name}") for name in names],
+        "actuators": [ColumnMap(name) for name in names],
+    }
+
+
+def timeout_of(heard: Heard) -> Said | None:
+    """A longer time-out of the inputs, if they come too rarely for the usual one."""
+    gaps = [np.diff(np.sort(times)) for times in (heard.traces.lever_s, heard.traces.time_s)]
+    rare_s = max(float(np.quantile(gap, _RARE)) for gap in gaps if gap.size)
+    if 2.0 * rare_s <= _USUAL_TIMEOUT_S:
+        return None
+    value = min(_LONGEST_TIMEOUT_S, float(np.ceil(20.0 * rare_s) / 10.0))
+    return Said(value, f"messages are up to {rare_s:.2f} s apart; silence is a fault", todo=True)

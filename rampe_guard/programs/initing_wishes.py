@@ -1,0 +1,55 @@
+"""What was asked of ``rampe-guard init``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, Self
+
+
+@dataclass(frozen=True, slots=True)
+class Wishes:
+    """What was asked for.
+
+    Attributes:
+        urdf: of the arm.
+        out: folder for what is written.
+        site, machine: names.
+        log: recording to measure from.
+        time: column of time, for a CSV log.
+        connect: endpoints to listen on.
+        zenoh: Zenoh configuration file instead.
+        plain_network: messages without certificates may leave the machine.
+        joystick, actuators: keys; for a CSV log columns, with commas.
+        seconds: for how long to listen [s].
+        joints: of the positions, in their order.
+        names: of the actuators, in the same order.
+        cylinders: NAME=BASE,ROD,LENGTH[,ANGLE[,DIRECTION]].
+        package_dirs: where package:// meshes are looked for.
+        force: overwrite.
+    """
+
+    urdf: str
+    out: str
+    site: str = "my-site"
+    machine: str = ""
+    log: str | None = None
+    time: str | None = None
+    connect: tuple[str, ...] = ()
+    zenoh: str | None = None
+    plain_network: bool = False
+    joystick: str | None = None
+    actuators: str | None = None
+    seconds: float = 60.0
+    joints: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
+    cylinders: tuple[str, ...] = ()
+    package_dirs: tuple[str, ...] = ()
+    force: bool = False
+
+    @classmethod
+    def of(cls, args: Mapping[str, Any]) -> Self:
+        """From the options of the command line, by their names."""
+        given = {one.name: args[one.name] for one in fields(cls)}
+        lists = {name: tuple(value) for name, value in given.items() if isinstance(value, list)}
+        return cls(**{**given, **lists})
