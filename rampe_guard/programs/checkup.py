@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 import numpy as np
@@ -14,6 +14,10 @@ from rich.text import Text
 from rampe_guard.assembly import Machine
 from rampe_guard.core.scene import ActuatorLimit, SceneObject
 from rampe_guard.core.types import FloatArray, ZoneSweep
+from rampe_guard.programs.checkup_gaps import gaps
+from rampe_guard.programs.checkup_live import Live, live_check
+from rampe_guard.programs.checkup_reach import Reach, reaches
+from rampe_guard.programs.ros2_tools import topics
 from rampe_guard.runtime.loading import load_telling
 from rampe_guard.runtime.store import model_path
 from rampe_guard.runtime.zenoh_io import check_configuration
@@ -21,8 +25,16 @@ from rampe_guard.settings import Site, load_site
 from rampe_guard.settings.network import shown
 
 
-def checkup(site_path: str, console: Console) -> int:
+def checkup(
+    site_path: str, console: Console, picture: str | None = None, live: Live | None = None
+) -> int:
     """Load everything a guard would load and print what it is; 0 when all of it is usable.
+
+    Args:
+        site_path: the site file.
+        console: for people.
+        picture: file for a picture of the arm among its zones.
+        live: how to hear the machine too, if it should be.
 
     Raises:
         SettingsError, GeometryError: what is wrong, and where.
@@ -33,12 +45,22 @@ def checkup(site_path: str, console: Console) -> int:
         machine = load_telling(site)
     pose = resting_pose(machine.arm.limits)
     console.print(Text(f"{site.machine} at {site.name}", "bold"), Text(f"  {site.path}", "dim"))
-    for table in (_keys(site), _actuators(machine), _links(machine), _zones(machine, pose)):
+    reach = reaches(machine)
+    zones = _zones(machine, pose, reach)
+    for table in (_keys(site), _actuators(machine), _links(machine), zones):
         console.print()
         console.print(table)
     console.print()
-    for remark in (*_remarks(machine), *heard):
+    for remark in (*gaps(machine, reach), *heard):
         console.print(Text(f"note: {remark}", "yellow"))
+    if picture is not None:
+        from rampe_guard.programs.checkup_picture import draw  # noqa: PLC0415 - it takes a second
+
+        draw(machine, pose, picture)
+        console.print(f"picture: {picture}", highlight=False)
+    if live is not None and not live_check(site, machine.arm.limits, live, console):
+        console.print(Text("not ok: without these inputs nothing can be guarded", "bold red"))
+        return 2
     console.print(Text("ok: this site can be guarded", "bold"))
     return 0
 
@@ -76,6 +98,8 @@ def _keys(site: Site) -> Table:
     table = _table("keys and files", "what", "where")
     table.add_row("joystick", site.keys.joystick)
     table.add_row("actuators", site.keys.actuators)
+    for direction, topic, kind, _ in () if site.ros2 is None else topics(site):
+        table.add_row(f"ROS 2 {direction}", f"{topic} ({kind})")
     if site.keys.enabled is not None:
         table.add_row("switched on or off", site.keys.enabled)
     for item in site.scene.moving:
@@ -115,20 +139,21 @@ def _links(machine: Machine) -> Table:
     return table
 
 
-def _zones(machine: Machine, pose: FloatArray) -> Table:
-    table = _table(
-        "zones, with the arm in the middle of its travel", "name", "type", "margin", "clearance"
-    )
+def _zones(machine: Machine, pose: FloatArray, reach: Mapping[str, Reach]) -> Table:
+    title = "zones, with the arm in the middle of its travel, and in postures at random"
+    table = _table(title, "name", "type", "margin", "clearance", "met")
     swept = {z.zone: z for z in machine.sweeper.sweep(pose, np.zeros_like(pose)).zones}
     for zone in machine.site.scene.objects:
         where = _where(swept[zone.name], _unit(machine, zone))
         if not isinstance(zone, ActuatorLimit) and zone.key is not None:
             where = f"moves: unknown without a pose newer than {zone.timeout_s:g} s"
         margin = "" if isinstance(zone, ActuatorLimit) else f"{zone.margin_m:g} m"
-        table.add_row(zone.name, type(zone).__name__, margin, where)
+        met = reach[zone.name].words
+        table.add_row(zone.name, type(zone).__name__, margin, where, met)
     margin_m = machine.site.self_collision.margin_m
     for name in machine.sweeper.zones[len(machine.site.scene.objects) :]:
-        table.add_row(name, "the arm itself", f"{margin_m:g} m", _where(swept[name], "m"))
+        where, met = _where(swept[name], "m"), reach[name].words
+        table.add_row(name, "the arm itself", f"{margin_m:g} m", where, met)
     return table
 
 
@@ -144,26 +169,3 @@ def _unit(machine: Machine, zone: SceneObject) -> str:
     if isinstance(zone, ActuatorLimit):
         return machine.site.guard.actuators[zone.actuator].unit
     return "m"
-
-
-def _remarks(machine: Machine) -> list[str]:
-    remarks = [
-        f"joint {name!r} is driven by no actuator and held at {value:g}"
-        for name, value in machine.arm.fixed_joints.items()
-    ]
-    remarks += machine.sweeper.notes
-    always = [f"{a} and {b}" for a, b in machine.sweeper.always_touching]
-    if always:
-        remarks.append(f"links that always touch are not swept: {', '.join(always)}")
-    bare = [
-        name
-        for name, mesh in zip(machine.arm.link_names, machine.arm.meshes, strict=True)
-        if mesh is None
-    ]
-    if bare:
-        remarks.append(f"links without geometry are not swept: {', '.join(bare)}")
-    for zone in machine.site.scene.objects:
-        ignored = () if isinstance(zone, ActuatorLimit) else zone.ignore_links
-        if ignored and set(ignored) >= set(machine.arm.link_names) - set(bare):
-            remarks.append(f"zone {zone.name!r} ignores every link: it can never warn")
-    return remarks
