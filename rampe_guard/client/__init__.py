@@ -7,9 +7,11 @@
             print(item.machine, item.level, item.text)
 
 `fleet` is the pure part (messages and time → `MachineState` and items), `feed` drains Zenoh into
-it, `stream` does so in a thread; `Alerts` and `AsyncAlerts` are its two faces.
+it, `stream` does so in a thread; `Alerts` and `AsyncAlerts` are its two faces. `CommandShaper`
+is for machine controllers that follow the speed advice.
 """
 
+from rampe_guard.client.advice import CommandShaper
 from rampe_guard.client.alerts import Alerts
 from rampe_guard.client.async_alerts import AsyncAlerts
 from rampe_guard.client.items import (
@@ -27,6 +29,7 @@ __all__ = [
     "Alert",
     "Alerts",
     "AsyncAlerts",
+    "CommandShaper",
     "GuardRestarted",
     "Item",
     "MachineState",

@@ -62,7 +62,7 @@ class Alert(wire.Alert, frozen=True, kw_only=True, tag_field="event", tag="alert
 
     @property
     def over(self) -> bool:
-        """It has ended: nothing is repeated any more, nobody need acknowledge it."""
+        """Nothing is repeated any more, nobody need acknowledge it."""
         return self.state == "normal"
 
     @property

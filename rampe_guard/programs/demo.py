@@ -31,7 +31,8 @@ from rampe_guard.runtime.loading import load_telling
 from rampe_guard.runtime.say import Sayer
 from rampe_guard.runtime.stopping import StopFlag
 from rampe_guard.runtime.zenoh_io import Bus
-from rampe_guard.settings import load_site
+from rampe_guard.settings import Site, load_site
+from rampe_guard.simulate.process import quarry_work
 from rampe_guard.view.observer import Heard, Observer
 from rampe_guard.view.watch import watch
 
@@ -41,7 +42,15 @@ _AFTERMATH_S = 0.3
 """How long the guard may still speak after the operator has gone home [s]."""
 
 
-def demo(cycles: int, seed: int, console: Console, stop: StopFlag, port: int | None = None) -> int:
+def demo(
+    cycles: int,
+    seed: int,
+    console: Console,
+    stop: StopFlag,
+    port: int | None = None,
+    *,
+    obey: bool = False,
+) -> int:
     """Run the demo; returns the exit code.
 
     Args:
@@ -51,6 +60,7 @@ def demo(cycles: int, seed: int, console: Console, stop: StopFlag, port: int | N
         stop: ends it early, with a summary of what there was.
         port: of a dashboard, which takes the place of the screen: events are lines then; None
             for none.
+        obey: the machine follows the guard's speed advice.
 
     Raises:
         SettingsError: a dashboard is wanted whose extra is not installed.
@@ -68,7 +78,8 @@ def demo(cycles: int, seed: int, console: Console, stop: StopFlag, port: int | N
         guard = start("guard", ["-m", "rampe_guard", "run", site_path, "--connect", endpoint])
         # the operator waits for the guard before he begins to work
         work = ["-m", "rampe_guard.simulate.process", "--connect", endpoint]
-        operator = start("operator", [*work, "--cycles", str(cycles), "--seed", str(seed)])
+        work += ["--cycles", str(cycles), "--seed", str(seed), *(["--obey"] if obey else [])]
+        operator = start("operator", work)
         needed = [router, guard]
         if port is not None:
             args = ["dashboard", site_path, "--connect", endpoint, "--port", str(port)]
@@ -88,8 +99,22 @@ def demo(cycles: int, seed: int, console: Console, stop: StopFlag, port: int | N
         console.print("watching; Ctrl-C ends the demo with a summary")
         lines = console if port is None else Console(file=console.file, force_terminal=False)
         watch(observer, stop, lines, score.take)
-    console.print(closing_table(score.tally, None if stop() else cycles, score.loop_ms))
+    done = None if stop() else cycles
+    console.print(closing_table(score.tally, done, score.loop_ms))
+    if obey and done:
+        console.print(_price(site, score.tally, cycles, seed), highlight=False)
     return 0
+
+
+def _price(site: Site, tally: Tally, cycles: int, seed: int) -> str:
+    """What following the advice cost, against the same day with free levers, simulated offline."""
+    free_s = list(quarry_work(site, cycles, seed))[-1].time_s / cycles
+    took_s = tally.duration_s / cycles
+    contacts = sum(score.contacts for score in tally.scores(Level.WARNING).values())
+    return (
+        f"followed the advice: {contacts} contacts; a cycle took {took_s:.1f} s, with free levers"
+        f" {free_s:.1f} s ({100.0 * (took_s / free_s - 1.0):+.0f} %)"
+    )
 
 
 @dataclass

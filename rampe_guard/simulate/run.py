@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +32,7 @@ def simulate(
     duration_s: float | None = None,
     cycles: int | None = None,
     seed: int = 0,
+    shape: Callable[[FloatArray], FloatArray] | None = None,
 ) -> Iterator[Tick]:
     """Let ``operator`` work ``machine`` from rest at ``start`` (n,); no clock, as fast as asked.
 
@@ -44,6 +45,7 @@ def simulate(
         duration_s: ends the run after this time [s].
         cycles: ends the run after this many whole cycles; whichever comes first. Neither: never.
         seed: of the sensor noise.
+        shape: what the machine makes of a command (n,), along its actuators; None: obeys it.
 
     Yields:
         One `Tick` per period, the first at time 0.
@@ -63,7 +65,8 @@ def simulate(
     while not _over(k / rate_hz, duration_s, operator.cycles, cycles):
         axes = operator.step(k / rate_hz, state.position, state.velocity)
         yield Tick(k / rate_hz, axes, *measure(machine, state, rng))
-        state = step(machine, state, sign * axes[axis], 1.0 / rate_hz)
+        command = sign * axes[axis]
+        state = step(machine, state, command if shape is None else shape(command), 1.0 / rate_hz)
         k += 1
 
 
