@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -22,16 +22,26 @@ class Machine:
     arm: Arm
     sweeper: FclSweeper
 
-    def guard(self, start_s: float, boot_id: str, sweeper: PathSweeper | None = None) -> Guard:
+    def guard(
+        self,
+        start_s: float,
+        boot_id: str,
+        sweeper: PathSweeper | None = None,
+        *,
+        advise: bool = False,
+    ) -> Guard:
         """A guard that starts at ``start_s`` on the clock of its steps.
 
         Args:
             start_s: time at which monitoring begins [s].
             boot_id: makes alert ids unique across restarts.
             sweeper: instead of the machine's own (to time it, say).
+            advise: give speed advice if the site wants it: a replay has nobody to follow it.
         """
+        config = self.site.guard
+        advice = replace(config.advice, enabled=advise and config.advice.enabled)
         return Guard(
-            self.site.guard,
+            replace(config, advice=advice),
             self.arm.limits,
             sweeper or self.sweeper,
             start_s,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from typing import Any
 
 from rampe_guard.runtime.log_lines import FORMATS
 
@@ -89,8 +90,8 @@ def add_model_actions(model: argparse.ArgumentParser) -> None:
             parser.add_argument("--who", help="who wants it so (default: the user's name)")
 
 
-def add_scene_actions(scene: argparse.ArgumentParser) -> None:
-    """What to do with the scene of a guard that works."""
+def add_scene_actions(scene: argparse.ArgumentParser) -> argparse._SubParsersAction[Any]:
+    """What to do with the scene of a guard that works; further actions may be added."""
     actions = scene.add_subparsers(required=True, metavar="ACTION", dest="action")
     for action, text in (
         ("show", "print the scene in force"),
@@ -101,6 +102,7 @@ def add_scene_actions(scene: argparse.ArgumentParser) -> None:
         if action == "put":
             parser.add_argument("file", help="scene file (YAML)")
             parser.add_argument("--who", help="who puts it (default: the user's name)")
+    return actions
 
 
 def add_evaluate(parser: argparse.ArgumentParser) -> None:
@@ -143,6 +145,36 @@ def add_demo(parser: argparse.ArgumentParser) -> None:
         metavar="PORT",
         help="in the browser instead, on this port (default 8080)",
     )
+    parser.add_argument(
+        "--obey",
+        action="store_true",
+        help="the machine follows the guard's speed advice; the time that costs is told",
+    )
+
+
+def add_router(parser: argparse.ArgumentParser) -> None:
+    """Where it listens."""
+    parser.add_argument(
+        "endpoint", nargs="*", help="to listen on (default tcp/127.0.0.1:7447: this machine alone)"
+    )
+    parser.add_argument(
+        "--config", metavar="FILE", help="its Zenoh configuration (json5) instead of endpoints"
+    )
+
+
+def add_simulate(parser: argparse.ArgumentParser) -> None:
+    """Which machine, for how long, and where it goes."""
+    parser.add_argument(
+        "arm",
+        nargs="?",
+        default="config/sites/demo.yaml",
+        help="site file (YAML) or, with --out, a URDF (default: the demo's excavator at work)",
+    )
+    parser.add_argument("--out", metavar="FILE", help="write a CSV log, instead of playing live")
+    text = "work cycles, or pushes of each lever each way (default 3; live the demo goes on)"
+    parser.add_argument("--cycles", type=positive_int, help=text)
+    parser.add_argument("--seed", type=int, default=1, help="of operator and noise (default 1)")
+    add_connect(parser)
 
 
 def add_dashboard(parser: argparse.ArgumentParser) -> None:

@@ -31,6 +31,8 @@ class ArmDescription:
         joints: one entry per actuator, in actuator order, then the linkages.
         limits: per actuator (lower, upper) [unit]; None = from the URDF through the drive.
         folders: absolute paths of those in which its meshes must lie; None: anywhere.
+        package_dirs: paths of packages, or of folders that hold some, in which package://
+            meshes are looked for before the folders above the URDF.
     """
 
     urdf: str
@@ -38,3 +40,4 @@ class ArmDescription:
     joints: tuple[JointDrive, ...]
     limits: tuple[tuple[float | None, float | None], ...]
     folders: tuple[str, ...] | None = None
+    package_dirs: tuple[str, ...] = ()

@@ -116,6 +116,23 @@ class StoppingConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class AdviceConfig:
+    """Speed advice for machines that shape the operator's command.
+
+    Attributes:
+        enabled: whether it is given.
+        hold_s: how long a command may follow one advice [s]; then the next one must have come.
+        period_s: from one advice to the next [s].
+        rise_per_s: how fast a share may rise [1/s].
+    """
+
+    enabled: bool = False
+    hold_s: float = 0.25
+    period_s: float = 0.05
+    rise_per_s: float = 2.0
+
+
+@dataclass(frozen=True, slots=True)
 class NextConfig:
     """The forecast of what follows, from the memory of situations.
 
@@ -221,5 +238,6 @@ class GuardConfig:
     next: NextConfig = field(default_factory=NextConfig)
     alerts: AlertConfig = field(default_factory=AlertConfig)
     inputs: InputConfig = field(default_factory=InputConfig)
+    advice: AdviceConfig = field(default_factory=AdviceConfig)
     axes: int = 0
     """Number of joystick axes that a message must have at least."""

@@ -68,7 +68,7 @@ class DisplacementForecast:
 
     @property
     def likeliest(self) -> FloatArray:
-        """Where he most likely ends (n,) [unit]: the mean, or the likelier of two futures."""
+        """Where he most likely ends (n,) [unit]; the mean, or the likelier of two futures."""
         return self.mean if self.modes is None else self.modes[0]
 
     def survival(self, distance: FloatArray) -> FloatArray:

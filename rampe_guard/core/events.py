@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
+from rampe_guard.core.advice import Advice
 from rampe_guard.core.alarm import Inhibit, Level, State
 from rampe_guard.core.foresight import NOTHING, Outlook
 from rampe_guard.core.types import Category, FloatArray, ZoneSweep
@@ -142,4 +143,16 @@ class RefusalEvent:
     detail: str
 
 
-Event: TypeAlias = AlertEvent | PredictionEvent | RefusalEvent
+@dataclass(frozen=True, slots=True)
+class AdviceEvent:
+    """Speed advice to publish; ``advice`` is None while nobody can give any, with ``why``."""
+
+    seq: int
+    advice: Advice | None
+    why: str | None
+    degraded: bool
+    stamp_s: float | None
+    now_s: float
+
+
+Event: TypeAlias = AlertEvent | PredictionEvent | AdviceEvent | RefusalEvent

@@ -198,6 +198,11 @@ class Forecaster:
         return float(at_top @ times / at_top.sum())
 
     def _within(self, q: FloatArray, displacement: FloatArray) -> FloatArray:
-        low = np.minimum(self._limits[:, 0] - q, 0.0)
-        high = np.maximum(self._limits[:, 1] - q, 0.0)
-        return np.clip(displacement, low, high)
+        return within_travel(self._limits, q, displacement)
+
+
+def within_travel(limits: FloatArray, q: FloatArray, displacement: FloatArray) -> FloatArray:
+    """The part of a displacement from ``q``, (n,) each, that leads no further past ``limits``."""
+    low = np.minimum(limits[:, 0] - q, 0.0)
+    high = np.maximum(limits[:, 1] - q, 0.0)
+    return np.clip(displacement, low, high)

@@ -17,6 +17,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rampe_guard.core.advice import Instant
+from rampe_guard.core.advising import Advising
 from rampe_guard.core.alarm import Level
 from rampe_guard.core.annunciator import Annunciator, Moment
 from rampe_guard.core.assessment import Assessor, State, Surroundings
@@ -101,6 +103,7 @@ class Guard:
         self._intention = Intention(config, limits)
         self._velocity = VelocityEstimator(np.array([a.max_velocity for a in config.actuators]))
         self._assessor = Assessor(config, limits, sweeper)
+        self._advising = Advising(config, limits, sweeper)
         self._annunciator = Annunciator(config.alerts, boot_id)
         self._newest: ActuatorSample | None = None
         self._machine_s = 0.0
@@ -150,9 +153,11 @@ class Guard:
         if health.off:
             self._interrupt()
             events += self._annunciator.switch_off(moment)
+            events += self._advising.blind(health, moment.stamp_s, now_s)
         elif health.status is Status.NOT_MONITORING:
             self._interrupt()
             events += self._annunciator.freeze(moment)
+            events += self._advising.blind(health, moment.stamp_s, now_s)
         elif self._newest is not None and (self._newest is not before or self._must_look(now_s)):
             events += self._evaluate(self._newest, now_s)
         else:
@@ -170,6 +175,7 @@ class Guard:
             moving: the objects whose poses come from a key.
         """
         self._assessor.change_scene(sweeper)
+        self._advising.change_scene(sweeper)
         self._annunciator.change_zones(zones)
         self._moving.change(moving)
         self._sweeps, self._risks, self._other_scene = (), (), True
@@ -302,10 +308,13 @@ class Guard:
         if found.unknown:
             self._monitor.sweep_unknown(now_s)
         self._sweeps, self._risks = found.sweeps, found.risks
-        moment = self._moment(self._health(now_s), now_s)
-        alerts = self._annunciator.update(found.evidence, moment)
+        health = self._health(now_s)
+        alerts = self._annunciator.update(found.evidence, self._moment(health, now_s))
+        velocity, command = self._velocity.velocity, self._intention.command
+        now = Instant(newest.position, velocity, command, around.placed, around.restless, now_s)
+        advice = self._advising.sighted(now, newest.stamp_s, health)
         news = self._intention.update(newest.position, self._sweeps, now_s)
-        return [*alerts, *(self._foretold(event) for event in news)]
+        return [*alerts, *advice, *(self._foretold(event) for event in news)]
 
     def _must_look(self, now_s: float) -> bool:
         if self._other_scene:

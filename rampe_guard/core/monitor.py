@@ -27,6 +27,9 @@ _IMPLAUSIBLE_SHARE = 0.1
 OVERLOAD: Final = "overload"
 """Refusal of a message that came faster than messages can be looked at."""
 _FLOW_S = 1.0
+_REFUSED_RUN, _REFUSED_S = 3, 0.2
+"""So many refused in a row, and none good for so long [s], is not waited out like silence is: who
+speaks and says nothing that can be used has more than a gap."""
 _FAULTY_RUN = 3
 """Refused primitives in a row that are no chance."""
 _ENOUGH_SAMPLES = 20
@@ -134,6 +137,7 @@ class InputMonitor:
         self._accepted: Counter[InputName] = Counter()
         self._rejected: Counter[tuple[InputName, str]] = Counter()
         self._recent: dict[tuple[InputName, str], float] = {}
+        self._in_a_row: Counter[InputName] = Counter()
         self._window: deque[tuple[float, bool]] = deque()
         self._bad = 0
         self._unknown_s: float | None = None
@@ -145,6 +149,7 @@ class InputMonitor:
     def accept(self, name: InputName, arrival_s: float, stamp_s: float | None = None) -> None:
         """A good sample arrived; its own stamp, if it had one, tells how late."""
         self._accepted[name] += 1
+        self._in_a_row[name] = 0
         if name == "enabled":  # which says nothing of where the machine is
             return
         self._last_s[name] = arrival_s
@@ -165,6 +170,7 @@ class InputMonitor:
         if reason == OVERLOAD:  # which says nothing of whether its columns are right
             self._flows.setdefault(name, _Flow()).lost(now_s)
             return
+        self._in_a_row[name] += 1
         if name != "enabled":
             self._note(now_s, good=False)
 
@@ -259,7 +265,8 @@ class InputMonitor:
             last = self._last_s["joystick"]
             recent = last is not None and now_s - last <= RECENT_S
             # it may not speak again for long: one that was late does not blind for ever
-            return self._late("joystick", 0.0) if recent else None
+            late = self._late("joystick", 0.0) if recent else None
+            return late or self._unusable("joystick", now_s)
         return self._silence("joystick", now_s)
 
     def _silence(self, name: InputName, now_s: float) -> Reason | None:
@@ -267,8 +274,16 @@ class InputMonitor:
         if last is None:
             return Reason(f"{name}_silent", name, f"no good {name} message yet")
         if now_s - last <= limit:
-            return self._late(name, max(now_s - last, 0.0))
+            return self._late(name, max(now_s - last, 0.0)) or self._unusable(name, now_s)
         return Reason(f"{name}_silent", name, f"no good {name} message for more than {limit:g} s")
+
+    def _unusable(self, name: InputName, now_s: float) -> Reason | None:
+        """Messages keep coming, but not one of them is fit for use."""
+        count, last = self._in_a_row[name], self._last_s[name]
+        if count < _REFUSED_RUN or last is None or now_s - last <= _REFUSED_S:
+            return None
+        text = f"the last {count} {name} messages were refused, none was good for {_REFUSED_S:g} s"
+        return Reason(f"{name}_refused", name, text)
 
     def _late(self, name: InputName, since_s: float) -> Reason | None:
         """Messages keep coming, but they tell of long ago."""

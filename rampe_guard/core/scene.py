@@ -106,11 +106,15 @@ SceneObject: TypeAlias = SolidObject | ActuatorLimit
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """All zones of a site, names unique, in file order."""
+    """All zones of a site, names unique, in file order.
+
+    ``path`` is of the scene file, ``text`` what was read, ``content_hash`` of that and all meshes.
+    """
 
     objects: tuple[SceneObject, ...]
     path: str = ""
     content_hash: str = ""
+    text: str = ""
 
     @property
     def moving(self) -> tuple[SolidObject, ...]:

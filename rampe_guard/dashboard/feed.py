@@ -28,6 +28,7 @@ from rampe_guard.dashboard.scene_follow import SceneFollower
 from rampe_guard.dashboard.sight import Sight
 from rampe_guard.errors import ConnectionFailedError, MessageError
 from rampe_guard.runtime.batch import pose_of
+from rampe_guard.runtime.decoding import decoders_of, limits_said
 from rampe_guard.runtime.stopping import StopFlag
 from rampe_guard.runtime.zenoh_io import Bus, Inbox, Liveness
 from rampe_guard.settings import Site
@@ -68,6 +69,7 @@ class Feed:
 
     def __init__(self, site: Site, stop: StopFlag) -> None:
         self._site = site
+        self._decoders = decoders_of(site, limits_said(site))
         self._base = site.keys.base
         self._stop = stop
         now_s = time.monotonic()
@@ -235,12 +237,11 @@ class Feed:
 
     def _take_inputs(self, line: _Line, sight: Sight) -> Sight:
         site, now_s = self._site, sight.now_s
-        names, axes = site.actuator_names, site.guard.axes
-        levers = line.joystick.read(lambda p: wire.decode_joystick(p, axes))
+        levers = line.joystick.read(self._decoders.joystick)
         if levers:
             command = [a.sign * levers[-1].axes[a.axis] for a in site.guard.actuators]
             sight = replace(sight, command=np.array(command), command_s=now_s)
-        for moved in line.actuators.read(lambda p: wire.decode_actuators(p, names)):
+        for moved in line.actuators.read(self._decoders.actuators):
             position = np.array(moved.position)
             measured = None if moved.velocity is None else np.array(moved.velocity)
             stamp_s = now_s if moved.stamp is None else moved.stamp

@@ -11,7 +11,7 @@ lost      ✕        magenta/white   once a second (the banner's shape)
 off       ○        grey            none
 ========  =======  ==============  ===================================
 
-It is the table "Colours and sounds" of the README.
+It is the table "Colours and sounds" of the documentation.
 
 Nothing is green. What nobody watches over has no colour at all but the banner's own.
 """

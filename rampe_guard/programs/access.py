@@ -18,7 +18,7 @@ MAX_MESSAGE_BYTES: Final = 128 * 1024
 """Twice what the guard takes: the router drops without a word, the guard refuses and counts."""
 MAX_SCENE_BYTES: Final = 8 * 1024 * 1024
 MAX_REPLY_BYTES: Final = 16 * 1024 * 1024
-PUBLISHED: Final = ("alert", "prediction", "heartbeat")
+PUBLISHED: Final = ("alert", "prediction", "advice", "heartbeat")
 READ: Final = ("state", "scene")
 """Queries of those who only look."""
 COMMANDS: Final = {
@@ -168,6 +168,9 @@ def _machine(machine: MachineModel) -> Iterator[Rule]:
     if machine.joystick_alive is not None:
         token = (machine.joystick_alive,)
         yield _rule(f"joystick {machine.name}", "ingress", ("liveliness_token",), token)
+    advice = (f"{machine.base}/advice",)
+    yield _rule(f"machine {machine.name}: asks", "ingress", ("declare_subscriber",), advice)
+    yield _rule(f"machine {machine.name}: is advised", "egress", ("put",), advice)
 
 
 def _guard(machine: MachineModel, read: str) -> Iterator[Rule]:

@@ -18,6 +18,7 @@ from rampe_guard.errors import InterruptedReplayError, LogError, MessageError, M
 from rampe_guard.evaluate.tally import Tally
 from rampe_guard.programs.scoring import closing_table
 from rampe_guard.recording import Log, McapLog, McapReading, is_mcap, open_log
+from rampe_guard.recording.bag import is_bag
 from rampe_guard.recording.compare import ZoneComparison, changes, compare
 from rampe_guard.recording.recorded_site import (
     learned_before,
@@ -69,7 +70,7 @@ def replay_offline(
         if compare and not isinstance(log, McapLog):
             raise LogError(f"{log_path}: a CSV log has no alerts to compare with")
         tell_warnings(site, log)
-        if site_path is None and isinstance(log, McapLog):
+        if site_path is None and isinstance(log, McapLog) and isinstance(log.reading, McapReading):
             for what in other_files(log.reading):
                 text = f"the recorded guard worked with another {what} than is attached"
                 print(f"warning: {log_path}: {text}", file=sys.stderr)  # noqa: T201
@@ -92,6 +93,8 @@ def site_of(site_path: str | None, log_path: str) -> Iterator[Site]:
     if site_path is not None:
         yield load_site(site_path)
         return
+    if is_bag(log_path):
+        raise LogError(f"{log_path}: a ROS bag has no site in it; give SITE before it")
     if not is_mcap(log_path):
         raise LogError(f"{log_path}: a CSV log has no site in it; give SITE before it")
     with recorded_site(McapReading(log_path)) as site:
@@ -131,6 +134,20 @@ def _not_used(log: McapLog, why: str) -> None:
     print(f"warning: {log.path}: {why}", file=sys.stderr)  # noqa: T201
 
 
+def _moved(machine: Machine, log: Log, stop: StopFlag) -> Tally:
+    """A tally that has seen where the arm truly was."""
+    tally, seen = Tally(machine.sweeper, machine.sweeper.zones), False
+    for t, q in log.positions():
+        if stop():
+            raise InterruptedReplayError("interrupted: no score")
+        seen = True
+        tally.position(t, q)
+    if not seen:  # nothing is known of the arm, which is not the same as that it met nothing
+        key = machine.site.keys.actuators
+        raise LogError(f"nothing can be judged: there is no position of the arm, on {key}")
+    return tally
+
+
 def _lines(
     machine: Machine,
     log: Log,
@@ -141,11 +158,7 @@ def _lines(
     repeats: bool,
 ) -> Iterator[bytes]:
     scribe = Scribe(machine.site, BOOT_ID, lambda now_s: log.epoch_s + now_s)
-    tally = Tally(machine.sweeper, machine.sweeper.zones)
-    for t, q in log.positions():
-        if stop():
-            raise InterruptedReplayError("interrupted: no score")
-        tally.position(t, q)
+    tally = _moved(machine, log, stop)
     for now_s, events in replay(guard, log):
         if stop():
             raise InterruptedReplayError("interrupted: the alerts are not complete, no score")

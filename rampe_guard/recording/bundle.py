@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Final
 
+from rampe_guard.collision.mesh_gltf import companions
+from rampe_guard.collision.mesh_places import manifest_of
 from rampe_guard.collision.urdf import mesh_file, read_urdf
 from rampe_guard.core.scene import Mesh
 from rampe_guard.errors import LogError
@@ -39,12 +41,8 @@ class Bundle:
     absolute: Mapping[str, str]
 
 
-def gather(site: Site, scene_text: str | None = None) -> Bundle:
-    """Read all files of a site: its own, scene, URDF, and the meshes of both.
-
-    Args:
-        site: with the scene that is meant.
-        scene_text: its text, if that is not what stands in the scene file.
+def gather(site: Site) -> Bundle:
+    """All files of a site: its own, URDF, and meshes, and the scene as the site has it.
 
     Raises:
         SettingsError: one cannot be read.
@@ -59,12 +57,11 @@ def gather(site: Site, scene_text: str | None = None) -> Bundle:
         else read_bytes(source, "file", limit=MAX_MESH_BYTES)
         for place, source in places.items()
     }
-    text = read_bytes(site.scene.path, "scene file")
-    if scene_text is not None:
-        text = files[names[_absolute(site.scene.path)]] = scene_text.encode()
+    # not what stands in its file by now: a guard may have been given another one
+    files[names[_absolute(site.scene.path)]] = site.scene.text.encode()
     absolute = {
         written: names[place]
-        for written, place in _written(site, text)
+        for written, place in _written(site)
         if Path(written.removeprefix("file://")).is_absolute()
     }
     return Bundle(names[_absolute(site.path)], files, absolute)
@@ -113,20 +110,35 @@ def _renamed(name: str, content: bytes, meant: Mapping[bytes, bytes]) -> bytes:
 
 
 def _places(site: Site) -> Iterator[tuple[Path, str | None]]:
-    """Where each file is as its referrer sees it, and what to read; None: what is left out."""
+    """Where each file is as its referrer sees it, and what to read; None: nothing from there."""
     yield _absolute(site.path), site.path
-    yield _absolute(site.scene.path), site.scene.path
+    yield _absolute(site.scene.path), None
     yield _absolute(site.arm.urdf), site.arm.urdf
     for _, file in _of_the_network(site):
         yield _absolute(file), None
     for item in site.scene.objects:
         if isinstance(item, Mesh):
-            yield _absolute(item.file), item.file
-    for _, place, found in _urdf_meshes(site):
-        yield place, str(found)
+            yield from _mesh(_absolute(item.file), Path(item.file))
+    for name, place, found in _urdf_meshes(site):
+        yield from _mesh(place, found)
+        manifest = manifest_of(name, found)
+        if manifest is not None:  # by which the package is found under its name
+            yield _beside(place, found, manifest), str(manifest)
 
 
-def _written(site: Site, scene_text: bytes) -> Iterator[tuple[str, Path]]:
+def _mesh(place: Path, file: Path) -> Iterator[tuple[Path, str]]:
+    """A mesh, and the files beside it that it needs."""
+    yield place, str(file)
+    for part in companions(file):
+        yield _beside(place, file, part), str(part)
+
+
+def _beside(place: Path, file: Path, other: Path) -> Path:
+    """Where another file is for whom ``file`` is at ``place``."""
+    return _absolute(place.parent / os.path.relpath(other, file.parent))
+
+
+def _written(site: Site) -> Iterator[tuple[str, Path]]:
     """References as they stand in the files, and which place each means."""
     document = parse(read_bytes(site.path, "site file"), site.path).data
     yield document["arm"]["urdf"], _absolute(site.arm.urdf)
@@ -136,7 +148,7 @@ def _written(site: Site, scene_text: bytes) -> Iterator[tuple[str, Path]]:
         for key in path:
             written = written[key]
         yield written, _absolute(file)
-    scene = parse(scene_text, site.scene.path).data
+    scene = parse(site.scene.text, site.scene.path).data
     files = {item["name"]: item["file"] for item in scene["objects"] if "file" in item}
     for item in site.scene.objects:
         if isinstance(item, Mesh):
@@ -161,11 +173,11 @@ def _urdf_meshes(site: Site) -> list[tuple[str, Path, Path]]:
     urdf = site.arm.urdf
     folder, here = _absolute(urdf).parent, Path(urdf).resolve().parent
     for link in read_urdf(Path(urdf)).links:
-        for shape in link.collisions or link.visuals:
+        for shape in link.shapes:
             if shape.geometry.mesh is None:
                 continue
             reference = shape.geometry.mesh.filename
-            file = mesh_file(reference, Path(urdf), site.folders)
+            file = mesh_file(reference, Path(urdf), site.folders, site.package_dirs)
             place = file
             if not Path(reference.removeprefix("file://")).is_absolute():
                 place = folder / os.path.relpath(file, here)  # the URDF itself may be a link

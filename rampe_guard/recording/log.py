@@ -1,4 +1,4 @@
-"""Logs of work, whatever they are kept in: our own MCAP, or CSV with a mapping in the site file."""
+"""Logs of work, whatever they are kept in: MCAP, ROS bags, or CSV as the site file maps it."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Protocol
 
 from rampe_guard.core.types import ActuatorSample, FloatArray, Inputs, JoystickSample
 from rampe_guard.errors import LogError
+from rampe_guard.recording.bag import BagReading, is_bag
 from rampe_guard.recording.mcap_log import McapLog
 from rampe_guard.recording.reader import MAGIC, McapReading
 from rampe_guard.runtime.csv_log import read_csv_log
@@ -71,7 +72,7 @@ class Log(Protocol):
 
 
 def open_log(site: Site, path: str | Path, limits: FloatArray) -> Log:
-    """Open a log for a site; MCAP and CSV are told apart by what is in the file.
+    """Open a log for a site; MCAP, ROS bags and CSV are told apart by what is in the file.
 
     Args:
         site: whose guard is to see it.
@@ -81,6 +82,8 @@ def open_log(site: Site, path: str | Path, limits: FloatArray) -> Log:
     Raises:
         LogError: it cannot be read, or cannot be what the site file says.
     """
+    if is_bag(path):
+        return McapLog(site, BagReading(site, path), limits)
     if is_mcap(path):
         return McapLog(site, McapReading(path), limits)
     return read_csv_log(site, path, limits)

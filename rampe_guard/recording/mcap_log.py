@@ -18,9 +18,11 @@ import numpy as np
 from rampe_guard.core.inputs import Accepted, InputGate
 from rampe_guard.core.types import ActuatorSample, FloatArray, Inputs, JoystickSample
 from rampe_guard.errors import LogError
+from rampe_guard.recording.bag import BagReading
 from rampe_guard.recording.channels import Channel, understood
 from rampe_guard.recording.reader import McapReading
 from rampe_guard.runtime.batch import Batch
+from rampe_guard.runtime.decoding import decoders_of
 from rampe_guard.runtime.replay import idle_times
 from rampe_guard.runtime.zenoh_queries import Message
 from rampe_guard.settings import Site
@@ -40,7 +42,7 @@ class McapLog:
         LogError: nothing in it is an input of the site.
     """
 
-    def __init__(self, site: Site, reading: McapReading, limits: FloatArray) -> None:
+    def __init__(self, site: Site, reading: McapReading | BagReading, limits: FloatArray) -> None:
         self._site, self.reading, self._limits = site, reading, limits
         self._heard = {
             number: understood(site, channel.topic, channel.metadata)
@@ -72,10 +74,11 @@ class McapLog:
         """Time [s] of every step of a guard, and what arrived for it, if anything."""
         alive: bool | None = None
         last_s = self.first_s
+        decoders = decoders_of(self._site, self._limits)
         for now_s, messages in self._arrivals(_INPUTS):
             for idle_s in idle_times(last_s, now_s):
                 yield idle_s, Inputs(joystick_alive=alive)
-            batch = Batch(self._site, now_s, lambda *_: None)
+            batch = Batch(self._site, now_s, lambda *_: None, decoders)
             for channel, message in messages:
                 if channel.role == "joystick_alive":
                     alive = _alive(message.payload, alive)

@@ -12,6 +12,7 @@ import msgspec
 
 from rampe_guard import wire
 from rampe_guard.errors import LogError, MessageError
+from rampe_guard.recording.bag import BagReading
 from rampe_guard.recording.bundle import Bundle, unpack
 from rampe_guard.recording.channels import role_of
 from rampe_guard.recording.reader import McapReading
@@ -46,12 +47,12 @@ def recorded_site(reading: McapReading) -> Iterator[Site]:
         yield for_operator(load_site(path, within=folder), words.get("operator"))
 
 
-def learned_before(reading: McapReading) -> bytes | None:
+def learned_before(reading: McapReading | BagReading) -> bytes | None:
     """The model that was kept when the recording began; None if none was."""
     return next(iter(reading.contents(MODEL).values()), None)
 
 
-def remembered_before(reading: McapReading) -> bytes | None:
+def remembered_before(reading: McapReading | BagReading) -> bytes | None:
     """The situations that were kept when the recording began; None if none were."""
     return next(iter(reading.contents(SITUATIONS).values()), None)
 

@@ -70,4 +70,4 @@ class SceneWatch:
         if scene.content_hash != told.scene_hash:
             raise ConnectionFailedError("its meshes are others than here")
         site = replace(self._own, scene=scene)
-        return site, gather(site, told.scene)
+        return site, gather(site)

@@ -19,7 +19,7 @@ import msgspec
 from mcap.writer import CompressionType, Writer
 
 from rampe_guard import __version__
-from rampe_guard.recording.channels import Channel, schema_text
+from rampe_guard.recording.channels import Channel, encodings, schema_text
 
 METADATA: Final = "rampe.recording"
 END: Final = "rampe.recording.end"
@@ -168,11 +168,11 @@ class McapFile:
     def _id(self, channel: Channel, key: str) -> int:
         found = self._ids.get((channel, key))
         if found is None:
-            name = channel.schema
+            name, (schema, form) = channel.schema, encodings(channel)
             if name not in self._schemas:
                 text = schema_text(name)
-                self._schemas[name] = self._mcap.register_schema(name, "jsonschema", text)
-            found = self._mcap.register_channel(key, "json", self._schemas[name], channel.metadata)
+                self._schemas[name] = self._mcap.register_schema(name, schema, text)
+            found = self._mcap.register_channel(key, form, self._schemas[name], channel.metadata)
             self._ids[channel, key] = found
         return found
 

@@ -99,7 +99,7 @@ def read_csv_log(site: Site, path: str | Path, limits: FloatArray) -> CsvLog:
     names = site.actuator_names
     columns = [mapping.time]
     columns += [mapping.joystick[n] for n in names] + [mapping.actuators[n] for n in names]
-    rows, warnings = _rows(Path(path), columns)
+    rows, warnings = mapped_rows(Path(path), columns)
     n = len(names)
     axes = np.zeros((len(rows), site.guard.axes))
     for j, actuator in enumerate(site.guard.actuators):
@@ -109,8 +109,12 @@ def read_csv_log(site: Site, path: str | Path, limits: FloatArray) -> CsvLog:
     return log
 
 
-def _rows(path: Path, columns: list[ColumnMap]) -> tuple[FloatArray, list[str]]:
-    """Mapped values (k, columns) of every whole row, and a warning for every other."""
+def mapped_rows(path: Path, columns: list[ColumnMap]) -> tuple[FloatArray, list[str]]:
+    """Mapped values (k, columns) of every whole row, and a warning for every other.
+
+    Raises:
+        LogError: it cannot be read, a column is missing, or no row is whole.
+    """
     rows, warnings = [], []
     try:
         with path.open(newline="", encoding="utf-8") as file:

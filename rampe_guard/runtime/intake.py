@@ -14,6 +14,8 @@ from rampe_guard.core.types import InputName, Inputs
 from rampe_guard.errors import MessageError
 from rampe_guard.runtime.batch import Batch
 from rampe_guard.runtime.budget import Budget
+from rampe_guard.runtime.decoding import Decoders
+from rampe_guard.runtime.ros2_topics import RosTopics
 from rampe_guard.runtime.say import Sayer
 from rampe_guard.runtime.zenoh_io import Bus
 from rampe_guard.runtime.zenoh_queries import Message
@@ -72,11 +74,18 @@ def _without_oldest(messages: list[Message], key: str, count: int) -> list[Messa
 
 
 class Intake:
-    """The inputs of a machine and the poses of objects that move, drained by the worker."""
+    """The inputs of a machine and the poses of objects that move, drained by the worker.
 
-    def __init__(self, bus: Bus, site: Site, say: Sayer) -> None:
+    Args:
+        bus: to subscribe on.
+        site: whose keys count.
+        say: log.
+        decoders: of joystick and actuators.
+    """
+
+    def __init__(self, bus: Bus, site: Site, say: Sayer, decoders: Decoders) -> None:
         keys = site.keys
-        self._site = site
+        self._site, self._decoders = site, decoders
         self._say = say
         self._bus = bus
         self._rate_hz = site.guard.inputs.max_rate_hz
@@ -86,6 +95,7 @@ class Intake:
         self._objects: list[tuple[str, Stream]] = []
         self.change_objects(site.scene.moving)
         self._alive = None if keys.joystick_alive is None else bus.liveness(keys.joystick_alive)
+        self._ros = None if site.ros2 is None else RosTopics(bus, site)
 
     def change_objects(self, moving: Iterable[SolidObject]) -> None:
         """Hear of other objects from now on; a key that stays is heard without a gap."""
@@ -105,16 +115,26 @@ class Intake:
             streams.append(self._enabled)
         return sum(stream.overruns for stream in streams)
 
+    @property
+    def lost_on_the_way(self) -> dict[str, int]:
+        """Messages that never arrived, by the numbers that ROS 2 gives them; empty without."""
+        return {} if self._ros is None else self._ros.lost
+
     def collect(self, now_s: float) -> Inputs:
         """Everything that arrived.
 
         The actuators are drained first: the joystick message that a sender put before an
         actuator message is then in the same step, as it is in replay.
         """
-        batch = Batch(self._site, now_s, self._warn)
-        actuators = self._actuators.take(now_s)
-        self._read(batch, "joystick", self._joystick.take(now_s), batch.joystick)
+        batch = Batch(self._site, now_s, self._warn, self._decoders)
+        actuators, levers = self._actuators.take(now_s), self._joystick.take(now_s)
+        self._read(batch, "joystick", levers, batch.joystick)
         self._read(batch, "actuators", actuators, batch.actuators)
+        if self._ros is not None:
+            taken = {"joystick": levers, "actuators": actuators}
+            for source, missed in self._ros.look(batch, taken):
+                text = f"{source}: {missed} messages were lost on their way"
+                self._say.warn(f"{source}:lost", text, reason="lost", lost=missed)
         alive = None if self._alive is None else self._alive.poll()
         for name, stream in self._objects:
             messages, lost = stream.take(now_s)

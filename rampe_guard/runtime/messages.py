@@ -11,9 +11,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from rampe_guard import wire
+from rampe_guard.core.advice import Advice
 from rampe_guard.core.alarm import Inhibit, Level, State
 from rampe_guard.core.events import (
     SYSTEM_ZONE,
+    AdviceEvent,
     AlertEvent,
     PredictionEvent,
     PredictionSummary,
@@ -21,7 +23,7 @@ from rampe_guard.core.events import (
 )
 from rampe_guard.core.foresight import Outlook
 from rampe_guard.core.guard import Snapshot
-from rampe_guard.core.types import FloatArray
+from rampe_guard.core.types import FloatArray, Point, ZoneSweep
 from rampe_guard.settings import Site
 
 
@@ -60,7 +62,7 @@ class Scribe:
             time_to_collision_s=None if clear else found.time_to_collision_s,
             clearance_m=None if sweep is None else sweep.clearance_m,
             clearance_now_m=None if sweep is None else sweep.clearance_now_m,
-            contact_point_m=None if sweep is None else sweep.contact_point_m,
+            contact_point_m=None if sweep is None else _point(sweep),
             contact_fraction=None if sweep is None else sweep.contact_fraction,
             any_path=None,
             **_words(event),
@@ -111,6 +113,23 @@ class Scribe:
             published_unix_s=self.unix_s(event.now_s),
         )
 
+    def advice(self, event: AdviceEvent) -> wire.Advice:
+        """An advice event as ``rampe.advice.v1``."""
+        given, why = event.advice, event.why
+        return wire.Advice(
+            boot_id=self.boot_id,
+            seq=event.seq,
+            site=self.site.name,
+            machine=self.site.machine,
+            quality="none" if given is None else "degraded" if event.degraded else "good",
+            actuators=None if given is None else self._levers(given),
+            reason=why,
+            stamp=event.stamp_s,
+            published_unix_s=self.unix_s(event.now_s),
+            expires_after_s=self.site.guard.advice.hold_s,
+            text=wire.no_advice_text(why or "") if given is None else self._tightest(given),
+        )
+
     def state(
         self,
         heartbeat: wire.Heartbeat,
@@ -124,6 +143,25 @@ class Scribe:
             predictions=() if prediction is None else (prediction,),
             position=self._by_name(snapshot.position),
         )
+
+    def _levers(self, given: Advice) -> dict[str, wire.ActuatorAdvice]:
+        return {
+            name: wire.ActuatorAdvice(
+                negative_share=low,
+                positive_share=high,
+                negative_zone=zones[0],
+                positive_zone=zones[1],
+            )
+            for name, (low, high), zones in zip(
+                self.site.actuator_names, given.shares.tolist(), given.zones, strict=True
+            )
+        }
+
+    def _tightest(self, given: Advice) -> str:
+        i, k = divmod(int(given.shares.argmin()), 2)
+        share = float(given.shares[i, k])
+        lever = self.site.actuator_names[i] if share < 1.0 else None
+        return wire.advice_text(lever, share, given.zones[i][k])
 
     def _unix_or_none(self, now_s: float | None) -> float | None:
         return None if now_s is None else self.unix_s(now_s)
@@ -187,6 +225,11 @@ def _words(event: AlertEvent) -> dict[str, Any]:
     }
 
 
+def _point(sweep: ZoneSweep) -> Point | None:
+    """Where it touches first; an arm that is in the object already has no such point."""
+    return None if sweep.touching else sweep.contact_point_m
+
+
 def _sweep(summary: SweepSummary) -> wire.PredictionSweep:
     zone = summary.zone
     return wire.PredictionSweep(
@@ -195,7 +238,7 @@ def _sweep(summary: SweepSummary) -> wire.PredictionSweep:
         certificate=zone.certificate.value,
         contact_fraction=zone.contact_fraction,
         link=zone.link,
-        contact_point_m=zone.contact_point_m,
+        contact_point_m=_point(zone),
         clearance_m=zone.clearance_m,
         clearance_now_m=zone.clearance_now_m,
         probability=summary.probability,

@@ -10,6 +10,7 @@ from typing import TypeVar
 
 from rampe_guard import wire
 from rampe_guard.core.types import FloatArray
+from rampe_guard.runtime.ros2_player import RosInputs
 from rampe_guard.runtime.stopping import StopFlag
 from rampe_guard.runtime.zenoh_io import Bus, Outbox
 from rampe_guard.settings import Site
@@ -38,6 +39,7 @@ class Player:
         self._bus, self._alive_key = bus, f"{site.keys.base}/alive"
         self._joystick = bus.outbox(site.keys.joystick)
         self._actuators = bus.outbox(site.keys.actuators)
+        self._ros = None if site.ros2 is None else RosInputs(bus, site, site.ros2)
 
     def wait_for_listener(self, stop: StopFlag) -> bool:
         """Wait until somebody subscribes, at most ten seconds; whether somebody did."""
@@ -79,6 +81,8 @@ class Player:
 
         def put(message: tuple[str, bytes]) -> None:
             key, payload = message
+            if self._ros is not None and self._ros.put(key, payload):
+                return
             if key not in outboxes:
                 outboxes[key] = self._bus.outbox(key)
             outboxes[key].put(payload)
@@ -107,6 +111,9 @@ class Player:
     def _send(self, frame: Frame) -> None:
         stamp = time.time() if frame.stamp_s is None else frame.stamp_s
         axes = tuple(frame.axes.tolist())
+        if self._ros is not None:
+            self._ros.send(axes, frame.position.tolist(), stamp)
+            return
         self._joystick.put(wire.encode(wire.JoystickMessage(axes=axes, stamp=stamp)))
         velocity = None if frame.velocity is None else tuple(frame.velocity.tolist())
         position = tuple(frame.position.tolist())

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 
 from rampe_guard.errors import RampeGuardError
 from rampe_guard.runtime.stopping import StopFlag
@@ -27,16 +28,24 @@ def main() -> int:
     args = parser.parse_args()
     if bool(args.endpoints) is (args.config is not None):
         parser.error("give endpoints, or --config FILE")
-    stop = StopFlag.on_signals()
-    log_as_told()
     try:
-        with router(args.endpoints, args.config):
-            print("ready", flush=True)  # noqa: T201 - whoever started it waits for this line
-            while not stop.wait(1.0):
-                pass
+        return route(args.endpoints, args.config, StopFlag.on_signals())
     except RampeGuardError as error:
         print(error, file=sys.stderr)  # noqa: T201
         return 2
+
+
+def route(endpoints: Sequence[str], config: str | None, stop: StopFlag) -> int:
+    """Route until told to stop; says ``ready`` once it listens.
+
+    Raises:
+        RampeGuardError: it cannot listen there, or the file cannot be used.
+    """
+    log_as_told()
+    with router(endpoints, config):
+        print("ready", flush=True)  # noqa: T201 - whoever started it waits for this line
+        while not stop.wait(1.0):
+            pass
     return 0
 
 

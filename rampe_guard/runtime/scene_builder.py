@@ -17,7 +17,7 @@ from typing import Final
 from rampe_guard.collision import FclSweeper
 from rampe_guard.core.scene import Mesh
 from rampe_guard.errors import RampeGuardError, RefusedError
-from rampe_guard.runtime.scene_kept import SceneKeeper, SceneText
+from rampe_guard.runtime.scene_kept import SceneKeeper, SceneSource
 from rampe_guard.runtime.scene_trial import try_scene
 from rampe_guard.settings import Site, load_scene_text
 
@@ -29,7 +29,7 @@ _LONG: Final = 32 * 1024
 class Built:
     """A scene that is ready, and whether it is kept."""
 
-    source: SceneText
+    source: SceneSource
     sweeper: FclSweeper
     kept: bool
 
@@ -97,6 +97,6 @@ class SceneBuilder:
         scene = load_scene_text(text, self._site)
         if not tried and any(isinstance(item, Mesh) for item in scene.objects):
             self._trial(self._site.path, text)
-        source = SceneText(scene, text, who, unix_s)
+        source = SceneSource(scene, who, unix_s)
         ready = sweeper.in_scene(scene)
         return Built(source, ready, self._keeper.keep(source))

@@ -12,7 +12,7 @@ from rampe_guard.collision import FclSweeper
 from rampe_guard.errors import MessageError, RampeGuardError, RefusedError
 from rampe_guard.runtime.audit import Audit
 from rampe_guard.runtime.scene_builder import Built, SceneBuilder
-from rampe_guard.runtime.scene_kept import SceneKeeper, SceneText
+from rampe_guard.runtime.scene_kept import SceneKeeper, SceneSource
 from rampe_guard.runtime.zenoh_io import Bus
 from rampe_guard.runtime.zenoh_queries import Request
 from rampe_guard.settings import Site
@@ -24,7 +24,7 @@ COMMAND: Final = "scene/put"
 class Scenes:
     """The scene in force when a guard starts, and who keeps another one."""
 
-    source: SceneText
+    source: SceneSource
     keeper: SceneKeeper
 
 
@@ -111,7 +111,7 @@ class SceneDesk:
             site=self._site.name,
             machine=self._site.machine,
             scene_hash=now.source.scene.content_hash,
-            scene=now.source.text if with_text else None,
+            scene=now.source.scene.text if with_text else None,
             zones=now.sweeper.zones,
             put_by=now.source.put_by,
             put_unix_s=now.source.put_unix_s,

@@ -18,7 +18,6 @@ from rampe_guard.errors import ModelFileError, RampeGuardError
 from rampe_guard.runtime.say import Sayer
 from rampe_guard.runtime.store import ModelFile, model_folder
 from rampe_guard.settings import Site, load_scene_text
-from rampe_guard.settings.source import read_bytes
 from rampe_guard.wire import MAX_SCENE_BYTES
 
 _NAME: Final = "scene.kept.json"
@@ -30,18 +29,16 @@ UNUSABLE: Final = "scene_put_unusable"
 
 
 @dataclass(frozen=True, slots=True)
-class SceneText:
-    """A scene, the text that it was read from, and where that came from.
+class SceneSource:
+    """A scene, and where it came from.
 
     Attributes:
         scene: as the sweeper is built from it.
-        text: of its file.
         put_by: who put it; None if it is the site's own file.
         put_unix_s: when [s].
     """
 
     scene: Scene
-    text: str
     put_by: str | None = None
     put_unix_s: float | None = None
 
@@ -52,16 +49,6 @@ class _Kept(msgspec.Struct, frozen=True, kw_only=True):
     text: str
     who: str
     unix_s: float
-
-
-def own_scene(site: Site) -> SceneText:
-    """The site's own scene file, read again so that text and scene are the same.
-
-    Raises:
-        SettingsError: it cannot be read any more, or is wrong now.
-    """
-    content = read_bytes(site.scene.path, "scene file")
-    return SceneText(load_scene_text(content, site), content.decode("utf-8"))
 
 
 class SceneKeeper:
@@ -80,19 +67,13 @@ class SceneKeeper:
 
     def __init__(self, site: Site, say: Sayer) -> None:
         self._site, self._say = site, say
-        self._own_hash = site.scene.content_hash
         self.problem: str | None = None
         self.code = NOT_KEPT
         self.lost: str | None = None
 
-    def recall(self) -> SceneText:
-        """The scene that holds when a guard starts.
-
-        Raises:
-            SettingsError: the site's own scene cannot be read any more.
-        """
-        own = own_scene(self._site)
-        self._own_hash = own.scene.content_hash
+    def recall(self) -> SceneSource:
+        """The scene that holds when a guard starts."""
+        own = SceneSource(self._site.scene)
         if not self._site.memory.enabled:
             return own
         who = "somebody"
@@ -102,16 +83,16 @@ class SceneKeeper:
                 return own
             kept = _decode(content)
             who = kept.who
-            if kept.instead_of != self._own_hash:
+            if kept.instead_of != self._site.scene.content_hash:
                 self._say.info(f"the scene that {who} put gives way to a newer scene file")
                 return own
             scene = load_scene_text(kept.text, self._site)
         except RampeGuardError as error:
             return self.give_up(who, error)
         self._say.info(f"the scene is the one that {who} put", put_by=who)
-        return SceneText(scene, kept.text, who, kept.unix_s)
+        return SceneSource(scene, who, kept.unix_s)
 
-    def give_up(self, who: str, error: RampeGuardError) -> SceneText:
+    def give_up(self, who: str, error: RampeGuardError) -> SceneSource:
         """The site's own scene instead of one that cannot be used any more.
 
         What was kept stays where it is: a mesh that went may come back.
@@ -122,17 +103,17 @@ class SceneKeeper:
             f" {error}; put it again, or the site's own"
         )
         self._say.warn("scene", self.problem, code=UNUSABLE)
-        return own_scene(self._site)
+        return SceneSource(self._site.scene)
 
-    def keep(self, found: SceneText) -> bool:
+    def keep(self, found: SceneSource) -> bool:
         """Keep a scene that was put; whether that could be done (else `problem` tells why not)."""
         if not self._site.memory.enabled:
             self.problem = None
             return False
         kept = _Kept(
             format=_FORMAT,
-            instead_of=self._own_hash,
-            text=found.text,
+            instead_of=self._site.scene.content_hash,
+            text=found.scene.text,
             who=found.put_by or "",
             unix_s=found.put_unix_s or 0.0,
         )

@@ -20,6 +20,7 @@ from rampe_guard.errors import ConnectionFailedError, MessageError, SettingsErro
 from rampe_guard.runtime import zenoh_rules
 from rampe_guard.runtime.zenoh_config import blank, parts
 from rampe_guard.runtime.zenoh_queries import Desk, Inquiry, Message
+from rampe_guard.runtime.zenoh_ros2 import CdrOutbox, latched
 from rampe_guard.settings import ZenohSettings
 from rampe_guard.settings.network import redacted, shown
 
@@ -47,7 +48,8 @@ class Inbox:
             if sample is None:
                 break
             if sample.kind == zenoh.SampleKind.PUT:
-                messages.append(Message(str(sample.key_expr), sample.payload.to_bytes()))
+                attached = None if (more := sample.attachment) is None else more.to_bytes()
+                messages.append(Message(str(sample.key_expr), sample.payload.to_bytes(), attached))
         if len(messages) == self._capacity:
             self.overruns += 1  # a full ring has most likely dropped some
         return messages
@@ -187,6 +189,19 @@ class Bus:
     def outbox(self, key: str, schema: str | None = None, *, urgent: bool = False) -> Outbox:
         """Publish on a key; ``urgent`` is for alerts."""
         return Outbox(self._session, key, schema, urgent=urgent)
+
+    def cdr_outbox(self, key: str) -> CdrOutbox:
+        """Publish CDR on a key, each message with an attachment or none."""
+        return CdrOutbox(self._session, key)
+
+    def latched(self, key: str, timeout_s: float) -> bytes | None:
+        """The message that a latched publisher keeps on a key; see `zenoh_ros2.latched`."""
+        return latched(self._session, key, timeout_s)
+
+    @property
+    def zid(self) -> str:
+        """The id of this session."""
+        return str(self._session.info.zid())
 
     def desk(self, key: str) -> Desk:
         """Answer queries on a key."""

@@ -13,10 +13,11 @@ from rampe_guard.errors import MessageError
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """A payload as it came, with the exact key that it was put on."""
+    """A payload as it came, with the exact key that it was put on, and what was attached to it."""
 
     key: str
     payload: bytes
+    attachment: bytes | None = None
 
 
 class Inquiry:

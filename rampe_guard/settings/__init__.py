@@ -7,7 +7,9 @@
 
 from rampe_guard.settings.scene import load_scene, parse_scene
 from rampe_guard.settings.schema import scene_schema, site_schema
-from rampe_guard.settings.site import (
+from rampe_guard.settings.site import for_operator, load_scene_text, load_site
+from rampe_guard.settings.site_model import DEFAULT_ENDPOINT
+from rampe_guard.settings.site_types import (
     ColumnMap,
     Keys,
     LogMapping,
@@ -16,11 +18,7 @@ from rampe_guard.settings.site import (
     Site,
     TlsFiles,
     ZenohSettings,
-    for_operator,
-    load_scene_text,
-    load_site,
 )
-from rampe_guard.settings.site_model import DEFAULT_ENDPOINT
 
 __all__ = [
     "DEFAULT_ENDPOINT",

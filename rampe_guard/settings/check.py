@@ -8,6 +8,8 @@ from rampe_guard.settings import network
 from rampe_guard.settings.drive_model import impossible
 from rampe_guard.settings.network import PROVEN, protocol, shown
 from rampe_guard.settings.problems import KeyPath, Problems, did_you_mean, show
+from rampe_guard.settings.published import PUBLISHED
+from rampe_guard.settings.ros2_model import INPUTS, check_ros2, exact_key
 from rampe_guard.settings.site_model import (
     ArmModel,
     ColumnModel,
@@ -17,23 +19,21 @@ from rampe_guard.settings.site_model import (
     ZenohModel,
 )
 
-PUBLISHED = (
-    *("alert", "prediction", "heartbeat", "state", "scene", "scene/put", "ack", "shelve"),
-    *("forget", "alive", "recorder"),
-)
-"""What the guard publishes or answers under its base key."""
-
 _WILD = "*$?#"
 
 
 def check(model: SiteModel, problems: Problems) -> None:
     """Add every problem of ``model`` that needs no other file."""
     _keys(model, problems)
+    check_ros2(model, problems)
     _zenoh(model, problems)
     if model.alerts.caution_probability > model.alerts.warning_probability:
         warning = model.alerts.warning_probability
         what = f"{model.alerts.caution_probability:g} is greater than warning_probability"
         problems.add(("alerts", "caution_probability"), what, f"give at most its {warning:g}")
+    if model.advice.hold_s < 2.0 * model.advice.period_s:
+        what = f"{model.advice.hold_s:g} s is less than two periods of period_s"
+        problems.add(("advice", "hold_s"), what, f"give {2.0 * model.advice.period_s:g} or more")
     if model.alerts.expires_after_s < 2.0 * model.alerts.republish_s:
         what = f"{model.alerts.expires_after_s:g} s is less than two periods of republish_s"
         problems.add(
@@ -49,8 +49,7 @@ def check(model: SiteModel, problems: Problems) -> None:
 
 def _keys(model: SiteModel, problems: Problems) -> None:
     keys: list[tuple[KeyPath, str]] = [
-        (("keys", "joystick"), model.keys.joystick),
-        (("keys", "actuators"), model.keys.actuators),
+        *((("keys", name), exact_key(model, name, kind)) for name, kind in INPUTS),
         (("keys", "base"), model.keys.base),
     ]
     if model.keys.enabled is not None:

@@ -177,7 +177,7 @@ def _scene(document: Document, context: _Context, path: str) -> Scene:
                 problems.add(("objects", index, "file"), what, "simplify them, or give fewer")
                 problems.raise_if_any()
             digest.update(content)
-    return Scene(tuple(objects), path, digest.hexdigest())
+    return Scene(tuple(objects), path, digest.hexdigest(), document.content.decode("utf-8"))
 
 
 class _Builder:

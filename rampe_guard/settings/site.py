@@ -1,19 +1,18 @@
-"""Site files → `Site`: all that a machine's guard is built from, as plain frozen values."""
+"""Site files → `Site`."""
 
 from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Literal
 
 from pydantic import TypeAdapter, ValidationError
 
 from rampe_guard.core.arm import ArmDescription, JointDrive
 from rampe_guard.core.config import (
     ActuatorConfig,
+    AdviceConfig,
     AlertConfig,
     GuardConfig,
     InputConfig,
@@ -28,10 +27,11 @@ from rampe_guard.core.drive import CylinderDrive, FourBarDrive
 from rampe_guard.core.scene import Scene, SelfCollision
 from rampe_guard.errors import SettingsError
 from rampe_guard.folders import Folders
-from rampe_guard.settings.check import PUBLISHED, check
+from rampe_guard.settings.check import check
 from rampe_guard.settings.explain import validate
 from rampe_guard.settings.model import MAX_NAME, Name
 from rampe_guard.settings.problems import KeyPath, Problems, show
+from rampe_guard.settings.ros2_model import INPUTS, exact_key, ros2_settings
 from rampe_guard.settings.scene import existing_file, load_scene, parse_scene, pose_matrix
 from rampe_guard.settings.site_model import (
     DEFAULT_ENDPOINT,
@@ -43,152 +43,17 @@ from rampe_guard.settings.site_model import (
     SiteModel,
     ZenohModel,
 )
+from rampe_guard.settings.site_types import (
+    ColumnMap,
+    Keys,
+    LogMapping,
+    MemorySettings,
+    MetricsSettings,
+    Site,
+    TlsFiles,
+    ZenohSettings,
+)
 from rampe_guard.settings.source import Document, parse, read_bytes
-
-
-@dataclass(frozen=True, slots=True)
-class TlsFiles:
-    """Paths of PEM files; certificate and key are both there, or neither.
-
-    Attributes:
-        said: where each of them is named: root_ca, certificate, key; for messages.
-    """
-
-    root_ca: str
-    certificate: str | None = None
-    key: str | None = None
-    said: tuple[str, str, str] = ("zenoh.tls.root_ca", "zenoh.tls.certificate", "zenoh.tls.key")
-
-
-@dataclass(frozen=True, slots=True)
-class ZenohSettings:
-    """How to join the network.
-
-    Attributes:
-        config: path of a Zenoh file, which then alone configures the session, or None.
-        mode: "client" or "peer"; holds only without ``config``.
-        connect: endpoints; holds only without ``config``.
-        tls: certificates for tls/ and quic/ endpoints; holds only without ``config``.
-        plain_network: messages without certificates may leave the machine.
-    """
-
-    config: str | None
-    mode: Literal["client", "peer"]
-    connect: tuple[str, ...]
-    tls: TlsFiles | None = None
-    plain_network: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Keys:
-    """Exact Zenoh keys; ``base`` is the prefix of all that the guard publishes."""
-
-    joystick: str
-    actuators: str
-    base: str
-    joystick_alive: str | None
-    enabled: str | None = None
-
-    def used(self) -> dict[str, str]:
-        """Every key that means something at the site, and what."""
-        used = {f"{self.base}/{word}": "a key of the guard itself" for word in PUBLISHED}
-        for name in ("joystick", "actuators", "base", "enabled"):
-            if (key := getattr(self, name)) is not None:
-                used[key] = f"keys.{name}"
-        if self.joystick_alive is not None:
-            used[self.joystick_alive] = "inputs.joystick.alive_key"
-        return used
-
-
-@dataclass(frozen=True, slots=True)
-class ColumnMap:
-    """Site value = scale·(value in ``column``) + offset."""
-
-    column: str
-    scale: float = 1.0
-    offset: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class LogMapping:
-    """Columns of a CSV log: time [s], axis [-1, 1] and position [unit] by actuator name."""
-
-    time: ColumnMap
-    joystick: Mapping[str, ColumnMap]
-    actuators: Mapping[str, ColumnMap]
-
-
-@dataclass(frozen=True, slots=True)
-class MemorySettings:
-    """How what was learned outlives a restart.
-
-    Attributes:
-        enabled: whether it does.
-        directory: absolute path of the folder of all models, None for the system's usual one.
-        save_every_s: period of saving while something is learned [s].
-    """
-
-    enabled: bool = True
-    directory: str | None = None
-    save_every_s: float = 30.0
-
-
-@dataclass(frozen=True, slots=True)
-class MetricsSettings:
-    """Where Prometheus finds the guard: a host that we listen on, and a TCP port."""
-
-    host: str
-    port: int
-
-
-@dataclass(frozen=True, slots=True)
-class Site:
-    """A machine at a site.
-
-    Attributes:
-        name: of the site.
-        machine: name of the machine.
-        zenoh: how to join the network.
-        keys: what to subscribe to and publish on.
-        format: of the input messages.
-        arm: URDF, pose, drives and limits.
-        guard: actuators and settings of the core.
-        sweep: tolerances and budget.
-        scene: keep-out zones.
-        log: columns of CSV logs, None if the file names none.
-        path: absolute path of the site file.
-        content_hash: SHA-256 (hex) of the site file followed by the URDF.
-        package_dirs: where package:// meshes of the URDF are looked up.
-        operator: whose way of working is learned.
-        memory: how it is kept.
-        self_collision: whether the arm is swept against itself.
-        folders: where its files may lie; None for one that was not read from a file.
-        metrics: where metrics are served, None if they are not.
-    """
-
-    name: str
-    machine: str
-    zenoh: ZenohSettings
-    keys: Keys
-    format: Literal["json", "ros2"]
-    arm: ArmDescription
-    guard: GuardConfig
-    sweep: SweepConfig
-    scene: Scene
-    log: LogMapping | None
-    path: str
-    content_hash: str
-    package_dirs: tuple[str, ...] = ()
-    operator: str = "operator"
-    memory: MemorySettings = MemorySettings()
-    self_collision: SelfCollision = field(default_factory=SelfCollision)
-    folders: Folders | None = None
-    metrics: MetricsSettings | None = None
-
-    @property
-    def actuator_names(self) -> tuple[str, ...]:
-        """Names in the order of the arrays on the wire."""
-        return tuple(a.name for a in self.guard.actuators)
 
 
 def load_site(path: str | Path, *, within: str | Path | None = None) -> Site:
@@ -213,7 +78,9 @@ def load_site(path: str | Path, *, within: str | Path | None = None) -> Site:
     urdf = existing_file(problems, ("arm", "urdf"), directory, arm.urdf, "URDF file", folders)
     zenoh = _zenoh(model.zenoh, directory, folders, problems)
     names = tuple(a.name for a in arm.actuators)
-    keys = Keys(**model.keys.model_dump(), joystick_alive=model.inputs.joystick.alive_key)
+    exact = {name: exact_key(model, name, kind) for name, kind in INPUTS}
+    alive = model.inputs.joystick.alive_key
+    keys = Keys(**{**model.keys.model_dump(), **exact}, joystick_alive=alive)
     scene = Scene(())
     scene_file = existing_file(problems, ("scene",), directory, model.scene, "scene file", folders)
     if scene_file is not None:
@@ -230,7 +97,7 @@ def load_site(path: str | Path, *, within: str | Path | None = None) -> Site:
         zenoh=zenoh,
         keys=keys,
         format=model.format,
-        arm=_arm(model, urdf or "", folders),
+        arm=_arm(model, urdf or "", directory, folders),
         guard=_guard(model),
         sweep=SweepConfig(**model.sweep.model_dump()),
         scene=scene,
@@ -243,6 +110,7 @@ def load_site(path: str | Path, *, within: str | Path | None = None) -> Site:
         metrics=None if model.metrics is None else MetricsSettings(**model.metrics.model_dump()),
         self_collision=_self_collision(model.self_collision),
         folders=folders,
+        ros2=ros2_settings(model),
     )
 
 
@@ -341,14 +209,15 @@ def _zenoh(
     return ZenohSettings(config, model.mode, connect, tls, model.plain_network is not None)
 
 
-def _arm(model: SiteModel, urdf: str, folders: Folders) -> ArmDescription:
+def _arm(model: SiteModel, urdf: str, directory: Path, folders: Folders) -> ArmDescription:
     arm = model.arm
     index = {a.name: i for i, a in enumerate(arm.actuators)}
     own = [JointDrive(a.joint, i, a.drive.to_core()) for i, a in enumerate(arm.actuators)]
     more = [JointDrive(k.joint, index[k.actuator], k.drive.to_core()) for k in arm.linkages]
     limits = tuple((a.limits.lower, a.limits.upper) for a in arm.actuators)
     pose = pose_matrix(arm.base_pose)
-    return ArmDescription(urdf, pose, (*own, *more), limits, folders.paths)
+    packages = tuple(os.path.normpath(directory / d) for d in arm.package_dirs)
+    return ArmDescription(urdf, pose, (*own, *more), limits, folders.paths, packages)
 
 
 def _guard(model: SiteModel) -> GuardConfig:
@@ -361,6 +230,7 @@ def _guard(model: SiteModel) -> GuardConfig:
         rampe=RampeConfig(**rampe, prior=PriorConfig(**model.rampe.prior.model_dump())),
         stopping=StoppingConfig(**model.stopping.model_dump()),
         next=NextConfig(**model.next.model_dump()),
+        advice=AdviceConfig(**model.advice.model_dump()),
         alerts=AlertConfig(**model.alerts.model_dump()),
         inputs=InputConfig(
             joystick_timeout_s=inputs.joystick.timeout_s,

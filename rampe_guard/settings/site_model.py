@@ -9,7 +9,9 @@ from pydantic import Discriminator, Field, Tag
 from rampe_guard.core.scene import SelfCollision
 from rampe_guard.settings.drive_model import DirectModel, DriveModel
 from rampe_guard.settings.model import Model, Name, NonNegative, Number, Pose, Text
+from rampe_guard.settings.ros2_model import Ros2Model
 from rampe_guard.settings.tuning_model import (
+    AdviceModel,
     AlertsModel,
     InputsModel,
     JoystickModel,
@@ -67,8 +69,13 @@ class ZenohModel(Model):
 class KeysModel(Model):
     """Zenoh keys, exact: no wildcard, no slash at an end."""
 
-    joystick: Text = Field(description="The key the joystick is published on.")
-    actuators: Text = Field(description="The key the actuator positions are published on.")
+    joystick: Text = Field(
+        description="The key the joystick is published on; with format ros2 the topic, as in /joy."
+    )
+    actuators: Text = Field(
+        description="The key the actuator positions are published on; with format ros2 the topic, "
+        "as in /joint_states."
+    )
     base: Text = Field(description="The prefix of every key that the guard publishes.")
     enabled: Text | None = Field(
         default=None,
@@ -249,7 +256,12 @@ class SiteModel(Model):
     zenoh: ZenohModel = Field(default=ZenohModel(), description="The Zenoh session.")
     keys: KeysModel = Field(description="The Zenoh keys.")
     format: Literal["json", "ros2"] = Field(
-        default="json", description="The format of the input messages: json, or ros2 (CDR)."
+        default="json",
+        description="The format of joystick and actuators: json, or ros2 (CDR of sensor_msgs/Joy "
+        "and sensor_msgs/JointState).",
+    )
+    ros2: Ros2Model | None = Field(
+        default=None, description="How ROS 2 is spoken, with format ros2; left out: all defaults."
     )
     arm: ArmModel = Field(description="The arm.")
     scene: Text = Field(description="The scene file, relative to this file.")
@@ -264,6 +276,7 @@ class SiteModel(Model):
     next: NextModel = Field(
         default=NextModel(), description="The forecast of what follows, from memory."
     )
+    advice: AdviceModel = Field(default=AdviceModel(), description="The speed advice.")
     sweep: SweepModel = Field(default=SweepModel(), description="The certified sweep.")
     alerts: AlertsModel = Field(default=AlertsModel(), description="The alarm logic.")
     memory: MemoryModel = Field(

@@ -7,6 +7,7 @@ from typing import Annotated
 from pydantic import Field
 
 from rampe_guard.core.config import (
+    AdviceConfig,
     AlertConfig,
     Basis,
     InputConfig,
@@ -26,6 +27,7 @@ _RAMPE = RampeConfig()
 _SWEEP = SweepConfig()
 _ALERTS = AlertConfig()
 _NEXT = NextConfig()
+_ADVICE = AdviceConfig()
 _INPUTS = InputConfig()
 
 _Timeout = Annotated[float, Field(ge=0.02, le=60.0)]
@@ -118,6 +120,28 @@ class StoppingModel(Model):
 
     reaction_s: Annotated[float, Field(ge=0.0, le=5.0)] = Field(
         default=StoppingConfig().reaction_s, description="The operator's reaction time [s]."
+    )
+
+
+class AdviceModel(Model):
+    """Speed advice, for machines that shape the operator's command with it."""
+
+    enabled: bool = Field(
+        default=_ADVICE.enabled,
+        description="True if advice is published: how much of each lever leaves the arm able to "
+        "stop short of every zone. It costs some sweeps at each period.",
+    )
+    hold_s: Annotated[float, Field(ge=0.1, le=2.0)] = Field(
+        default=_ADVICE.hold_s,
+        description="How long a command may follow one advice [s]: it expires then. Longer is "
+        "gentler, and slower near obstacles.",
+    )
+    period_s: Annotated[float, Field(ge=0.02, le=0.5)] = Field(
+        default=_ADVICE.period_s, description="The time from one advice to the next [s]."
+    )
+    rise_per_s: Annotated[float, Field(gt=0.0, le=100.0)] = Field(
+        default=_ADVICE.rise_per_s,
+        description="How fast an advised share may rise [1/s]; it falls at once.",
     )
 
 

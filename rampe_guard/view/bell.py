@@ -1,4 +1,4 @@
-"""When the terminal's bell rings: a pure schedule (README, Colours and sounds).
+"""When the terminal's bell rings: a pure schedule (documentation, Colours and sounds).
 
 A terminal has one tone, so levels differ by rhythm: `imminent` rings four times a second,
 `warning` twice every two seconds, `caution` never. Where nobody is protected it rings like a

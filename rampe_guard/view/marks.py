@@ -1,4 +1,4 @@
-"""What a level looks like on a terminal: shape, word, colour, pulse (README: Colours and sounds).
+"""What a level looks like on a terminal: shape, word, colour, pulse (see Colours and sounds).
 
 Grey when all is normal, nothing is ever green, and no meaning hangs on colour alone. Only what
 nobody has acknowledged flashes, and only its shape: the words stay readable. The flashing is

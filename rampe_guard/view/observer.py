@@ -10,6 +10,7 @@ import msgspec
 from rampe_guard import wire
 from rampe_guard.core.types import FloatArray
 from rampe_guard.errors import ConnectionFailedError
+from rampe_guard.runtime.decoding import decoders_of
 from rampe_guard.runtime.zenoh_io import Bus
 from rampe_guard.settings import Site
 from rampe_guard.view import follow
@@ -36,7 +37,7 @@ class Observer:
 
     def __init__(self, bus: Bus, site: Site, limits: FloatArray) -> None:
         keys, base = site.keys, site.keys.base
-        self._site = site
+        self._decoders = decoders_of(site, limits)
         self._joystick = bus.inbox(keys.joystick, _CAPACITY)
         self._actuators = bus.inbox(keys.actuators, _CAPACITY)
         self._alerts = bus.inbox(f"{base}/alert", _CAPACITY)
@@ -51,10 +52,9 @@ class Observer:
     def poll(self) -> list[Heard]:
         """Take all that arrived into `state`; returns it too, oldest first per key."""
         now_s = time.monotonic()
-        names, axes = self._site.actuator_names, self._site.guard.axes
         heard: list[Heard] = []
-        heard += self._joystick.read(lambda p: wire.decode_joystick(p, axes))
-        heard += self._actuators.read(lambda p: wire.decode_actuators(p, names))
+        heard += self._joystick.read(self._decoders.joystick)
+        heard += self._actuators.read(self._decoders.actuators)
         heard += self._beats.read(lambda p: wire.decode(p, wire.Heartbeat))
         heard += self._predictions.read(lambda p: wire.decode(p, wire.Prediction))
         heard += self._alerts.read(lambda p: wire.decode(p, wire.Alert))

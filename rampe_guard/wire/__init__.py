@@ -6,6 +6,7 @@ site's units.
 """
 
 from rampe_guard.wire.ack import Ack
+from rampe_guard.wire.advice import ActuatorAdvice, Advice
 from rampe_guard.wire.alert import Alert, by_urgency
 from rampe_guard.wire.codec import MAX_PAYLOAD_BYTES, decode, encode
 from rampe_guard.wire.forget import Forget, Forgotten
@@ -39,14 +40,16 @@ from rampe_guard.wire.schema import json_schemas
 from rampe_guard.wire.shelve import Shelve
 from rampe_guard.wire.state import State
 from rampe_guard.wire.sweep import SweepReply, SweepRequest, decode_sweep_request
-from rampe_guard.wire.text import MAX_TEXT, alert_text
+from rampe_guard.wire.text import MAX_TEXT, advice_text, alert_text, no_advice_text
 
 __all__ = [
     "MAX_PAYLOAD_BYTES",
     "MAX_SCENE_BYTES",
     "MAX_TEXT",
     "Ack",
+    "ActuatorAdvice",
     "ActuatorsMessage",
+    "Advice",
     "Alert",
     "CanaryTrial",
     "Commands",
@@ -75,6 +78,7 @@ __all__ = [
     "State",
     "SweepReply",
     "SweepRequest",
+    "advice_text",
     "alert_text",
     "by_urgency",
     "decode",
@@ -85,4 +89,5 @@ __all__ = [
     "decode_sweep_request",
     "encode",
     "json_schemas",
+    "no_advice_text",
 ]

@@ -16,7 +16,7 @@ from ruamel.yaml.scalarstring import LiteralScalarString
 from rampe_guard.wire.channels import KEYS, PARAMETERS, Key
 from rampe_guard.wire.schema import json_schemas
 
-CONTRACT_VERSION: Final = "1.3.0"
+CONTRACT_VERSION: Final = "1.4.0"
 """Grows in the middle with every addition; the first number is the ``v1`` of the messages."""
 _SCHEMA_FORMAT = "application/schema+json;version=2020-12"
 _RULES = """\

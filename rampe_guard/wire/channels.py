@@ -106,6 +106,16 @@ KEYS: Final[tuple[Key, ...]] = (
         "rampe.prediction.v1",
     ),
     Key(
+        "advice",
+        "{base}/advice",
+        "published",
+        "20 Hz while `advice.enabled` of the site file: how much each actuator may be commanded so"
+        " that the arm can stop short of every zone. Advisory only. Older than its"
+        " `expires_after_s`, there is none, which is not the same as free.",
+        "rampe.advice.v1",
+        urgent=True,
+    ),
+    Key(
         "heartbeat",
         "{base}/heartbeat",
         "published",

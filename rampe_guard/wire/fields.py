@@ -21,7 +21,10 @@ AnyPath = Annotated[
 ]
 Point = Annotated[
     tuple[float, float, float] | None,
-    Meta(description="World point of the first contact [m]; null: none, or an actuator limit."),
+    Meta(
+        description="World point of the first contact [m]; null: none, an actuator limit, or the "
+        "arm is within the object."
+    ),
 ]
 Fraction = Annotated[
     float | None,
@@ -36,7 +39,10 @@ Clearance = Annotated[
 ]
 ClearanceNow = Annotated[
     float | None,
-    Meta(description="The same at the start of the path; negative inside the margin."),
+    Meta(
+        description="The same at the start of the path; negative inside the margin, and no less "
+        "than its width in the object."
+    ),
 ]
 Probability = Annotated[
     float | None, Meta(description="Probability of contact, 0 to 1; null where none is known.")

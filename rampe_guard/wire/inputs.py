@@ -104,7 +104,15 @@ def decode_joystick(payload: bytes, axes: int) -> JoystickMessage:
     Raises:
         MessageError: with its reason, when the message cannot be trusted.
     """
-    message = decode(payload, JoystickMessage, limit=MAX_PAYLOAD_BYTES)
+    return checked_joystick(decode(payload, JoystickMessage, limit=MAX_PAYLOAD_BYTES), axes)
+
+
+def checked_joystick(message: JoystickMessage, axes: int) -> JoystickMessage:
+    """The same of a message that is decoded already, from whatever format; all is finite.
+
+    Raises:
+        MessageError: with its reason, when the message cannot be trusted.
+    """
     got = len(message.axes)
     if not axes <= got <= _MAX_AXES:
         raise MessageError("wrong_length", f"axes has {got} values, the site needs {axes}")
@@ -122,7 +130,15 @@ def decode_actuators(payload: bytes, names: tuple[str, ...]) -> ActuatorsMessage
     Raises:
         MessageError: with its reason, when the message cannot be trusted.
     """
-    message = decode(payload, ActuatorsMessage, limit=MAX_PAYLOAD_BYTES)
+    return checked_actuators(decode(payload, ActuatorsMessage, limit=MAX_PAYLOAD_BYTES), names)
+
+
+def checked_actuators(message: ActuatorsMessage, names: tuple[str, ...]) -> ActuatorsMessage:
+    """The same of a message that is decoded already, from whatever format; all is finite.
+
+    Raises:
+        MessageError: with its reason, when the message cannot be trusted.
+    """
     _check_stamp(message.stamp)
     position = _checked("position", message.position, len(names))
     velocity = message.velocity

@@ -7,6 +7,7 @@ from typing import Any
 import msgspec
 
 from rampe_guard.wire.ack import Ack
+from rampe_guard.wire.advice import Advice
 from rampe_guard.wire.alert import Alert
 from rampe_guard.wire.forget import Forget, Forgotten
 from rampe_guard.wire.health import Heartbeat
@@ -34,6 +35,7 @@ _TAKEN: dict[str, type[msgspec.Struct]] = {
 _SENT: dict[str, type[msgspec.Struct]] = {
     "rampe.alert.v1": Alert,
     "rampe.prediction.v1": Prediction,
+    "rampe.advice.v1": Advice,
     "rampe.heartbeat.v1": Heartbeat,
     "rampe.state.v1": State,
     "rampe.recorder.v1": Recorder,

@@ -48,6 +48,28 @@ def alert_text(
     return _pair(link, _ARROW, zone, _when(time_to_collision_s) + why)
 
 
+def advice_text(lever: str | None, share: float, zone: str | None) -> str:
+    """Text such as ``swing at most 30 %: cab-wall``, of the lever that is limited most.
+
+    Args:
+        lever: actuator; None if nothing is limited.
+        share: of its top speed.
+        zone: what limits it.
+    """
+    if lever is None:
+        return "levers free"
+    # rounded down: no more is promised than was proven
+    return _pair(
+        _line(lever), f" at most {math.floor(100.0 * share)} %: ", _line(zone or "obstacle"), ""
+    )
+
+
+def no_advice_text(reason: str) -> str:
+    """Text for the time while nobody can tell."""
+    head = "NO ADVICE: "
+    return head + _cut(_line(reason), MAX_TEXT - len(head))
+
+
 def _system(reason: str, level: str, *, machine_off: bool) -> str:
     if level == "clear":
         return "machine off: not monitoring" if machine_off else "monitoring again"

@@ -11,7 +11,7 @@ from rampe_guard.settings import load_site
 from tests.support import processes
 from tests.support.browser import Page
 from tests.support.ears import Ears
-from tests.support.processes import BENCH, Process
+from tests.support.processes import BENCH, Process, started
 from tests.support.rig import Rig
 from tests.support.station import REST, Station
 
@@ -51,12 +51,7 @@ def start_dashboard(folder: Path, endpoint: str, port: int, *sites: Path) -> Pro
     """A dashboard that serves when this returns."""
     args = ["-m", "rampe_guard", "dashboard", *map(str, sites), "--connect", endpoint]
     process = Process(folder, "dashboard", [*args, "--port", str(port)])
-    try:
-        process.wait_for("dashboard on", 60.0)
-    except BaseException:
-        process.close()
-        raise
-    return process
+    return started(process, "dashboard on", 60.0)
 
 
 @contextlib.contextmanager

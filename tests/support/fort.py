@@ -14,7 +14,7 @@ from tests.support import processes
 from tests.support.bench_site import bench_copy
 from tests.support.ears import Ears
 from tests.support.pki import Pki
-from tests.support.processes import Process, until
+from tests.support.processes import Process, started, until
 
 MACHINE = "rampe/bench/excavator"
 BASE = f"{MACHINE}/guard"
@@ -91,12 +91,7 @@ def secure_router(folder: Path, config: Path) -> Process:
         patch.setenv("RUST_LOG", LOG)
         args = ["-m", "rampe_guard.runtime.router", "--config", str(config)]
         process = Process(folder, "router", args)
-    try:
-        process.wait_for("ready")
-    except BaseException:
-        process.close()
-        raise
-    return process
+    return started(process, "ready")
 
 
 def _site(folder: Path, endpoint: str, name: str) -> Path:

@@ -118,8 +118,7 @@ class Ground:
         words = ["-m", "tests.support.pusher", ",".join(self.endpoints), str(self.site_path)]
         more = [str(self._truth), "--rate", str(self.rate_hz), "--seed", str(self._seed)]
         process = Process(self.folder, "machine", [*words, *more], talk=True)
-        process.wait_for("ready")
-        return process
+        return processes.started(process, "ready")
 
     def _new_guard(self) -> Process:
         if self.clock is None:
@@ -127,12 +126,7 @@ class Ground:
             return processes.guard(self.folder, self.site_path, self.endpoint, *more)
         words = ["-m", "tests.support.clock_guard", str(self.clock), "run", str(self.site_path)]
         process = Process(self.folder, "guard", [*words, *self._connect()])
-        try:
-            process.wait_for("guarding on")
-        except BaseException:
-            process.close()
-            raise
-        return process
+        return processes.started(process, "guarding on")
 
     def _new_viewer(self) -> Process:
         words = ["-m", "rampe_guard", "watch", str(self.site_path), "--json"]
@@ -157,8 +151,7 @@ class Ground:
         path.write_text(json.dumps(config), "utf-8")
         words = ["-m", "rampe_guard.runtime.router", "--config", str(path)]
         process = Process(self.folder, f"router-{number}", words)
-        process.wait_for("ready")
-        return process
+        return processes.started(process, "ready")
 
     # What is done to it.
 

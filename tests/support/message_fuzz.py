@@ -1,5 +1,7 @@
 """Spoilt messages through the daemon's own loop, and what must hold of all of them.
 
+Joystick and actuators are JSON, or CDR as ROS 2 sends it.
+
 `runtime.daemon.run` itself runs, on a bus within this process and on a clock that advances by ten
 milliseconds a turn. At each turn a scripted machine tells truly how it stands, and between its
 messages come spoilt ones, of every kind that a guard takes. It must hold that
@@ -20,6 +22,7 @@ import json
 import logging
 import os
 import random
+import re
 import sys
 import time
 from collections import Counter, deque
@@ -35,7 +38,9 @@ import jsonschema  # type: ignore[import-untyped]
 from rampe_guard import wire
 from rampe_guard.errors import MessageError
 from rampe_guard.runtime import daemon, intake, worker
+from rampe_guard.runtime.decoding import decoders_of, limits_said
 from rampe_guard.settings import Site, load_site
+from tests.support import ros2
 from tests.support.bench_site import bench_copy
 from tests.support.gauges import cost
 from tests.support.memory_bus import MemoryBus, Query
@@ -179,6 +184,7 @@ class Fuzz:
         }
         self._words = ("ack", "shelve", "forget", "state", "scene", "scene/put")
         corpus = [*self._sound().values(), *(self._wish(word) for word in self._words[:3])]
+        self._decoders = decoders_of(site, limits_said(site))
         self._mutator = Mutator(self._rng, corpus)
 
     # What a stop flag is.
@@ -244,7 +250,13 @@ class Fuzz:
             "enabled": {**stamp, "enabled": True},
             "object_pose": {**stamp, "xyz_m": [5.0, 0.0, 0.0], "rpy_rad": [0.0, 0.0, 0.0]},
         }
-        return {kind: json.dumps(body).encode() for kind, body in told.items()}
+        said = {kind: json.dumps(body).encode() for kind, body in told.items()}
+        if self._site.ros2 is not None:
+            at_s, levers = told["joystick"]["stamp"], told["joystick"]["axes"]
+            said["joystick"] = ros2.joy(levers, at_s)
+            angles = ros2.angles_of(self._site, self._driver.position)
+            said["actuators"] = ros2.joint_state(angles, at_s)
+        return said
 
     def _spoil(self, sound: dict[str, bytes]) -> None:
         rng = self._rng
@@ -273,15 +285,17 @@ class Fuzz:
         """Whether the guard's decoder takes it; if so, the contract must as well."""
         try:
             if kind == "joystick":
-                wire.decode_joystick(payload, self._site.guard.axes)
+                self._decoders.joystick(payload)
             elif kind == "actuators":
-                wire.decode_actuators(payload, self._site.actuator_names)
+                self._decoders.actuators(payload)
             elif kind == "enabled":
                 wire.decode_enabled(payload)
             else:
                 wire.decode_object_pose(payload)
         except MessageError:
             return False
+        if self._site.ros2 is not None and kind in ("joystick", "actuators"):
+            return True
         fault = self._contract.fault(kind, payload)
         if fault is not None and "maximum" not in fault and "minimum" not in fault:
             self._complain(f"{kind} was taken against the contract ({fault}): {payload[:300]!r}")
@@ -383,12 +397,16 @@ _TRUCK = """
 """
 
 
-def fuzz_site(folder: Path) -> Path:
-    """The bench site with an enable key and an object that moves."""
+def fuzz_site(folder: Path, *, cdr: bool = False) -> Path:
+    """The bench site with an enable key and an object that moves; in ROS 2's words if ``cdr``."""
     scene = folder / "scene.yaml"
     scene.write_text(SCENE.read_text("utf-8") + _TRUCK, "utf-8")
     path = bench_copy(folder, "next: {situations: 10000}", machine="fuzz", scene=scene)
     text = path.read_text("utf-8").replace("keys:\n", "keys:\n  enabled: rampe/bench/fuzz/on\n")
+    if cdr:
+        text = re.sub(r"joystick: rampe/\S+", "joystick: /joy", text)
+        text = re.sub(r"actuators: rampe/\S+", "actuators: /joint_states", text)
+        text += "\nformat: ros2\nros2: {publish: false}\n"
     path.write_text(text, "utf-8")
     return path
 
@@ -398,9 +416,11 @@ def fuzz_messages(
     messages: int,
     seed: int,
     told: Callable[[Found], None] = lambda _: None,
+    *,
+    cdr: bool = False,
 ) -> Found:
     """Feed so many; what came of it. Raises whatever the daemon raises."""
-    path = fuzz_site(folder)
+    path = fuzz_site(folder, cdr=cdr)
     fuzz = Fuzz(load_site(path), messages, seed, told)
     with _patched(fuzz, folder):
         daemon.run(str(path), (), fuzz)  # type: ignore[arg-type]
@@ -409,13 +429,14 @@ def fuzz_messages(
 
 
 def main() -> None:
-    """A process of `tests.benchmarks.fuzz`: FOLDER MESSAGES SEED; found so far as JSON lines."""
+    """A process of `tests.benchmarks.fuzz`: FOLDER MESSAGES SEED CDR; what was found, as JSON."""
     logging.getLogger("rampe_guard").addHandler(logging.NullHandler())
 
     def told(found: Found) -> None:
         print(json.dumps({**vars(found), "messages": found.messages}), flush=True)
 
-    told(fuzz_messages(Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]), told))
+    folder, messages, seed, cdr = sys.argv[1:]
+    told(fuzz_messages(Path(folder), int(messages), int(seed), told, cdr=cdr == "cdr"))
 
 
 @contextlib.contextmanager

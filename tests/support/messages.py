@@ -7,6 +7,7 @@ from rampe_guard.wire import (
     Heartbeat,
     InputAges,
     InputRates,
+    Prediction,
     Quantiles,
     Reason,
     State,
@@ -72,3 +73,26 @@ ALERT = Alert(
     text="bucket → wall in 1.4 s",
 )
 STATE = State(heartbeat=HEARTBEAT, alerts=(), predictions=(), position=None)
+
+SWINGING = Prediction(
+    boot_id="boot-1",
+    seq=1,
+    site="bench",
+    machine="bench-excavator",
+    event="started",
+    category=(-1, 0, 0, 0),
+    observations=12,
+    mean={"swing": -0.5, "boom": 0.0, "stick": 0.0, "bucket": 0.0},
+    scale={"swing": 0.1, "boom": 0.0, "stick": 0.0, "bucket": 0.0},
+    dof=None,
+    start={"swing": 1.1, "boom": 0.065, "stick": 0.08, "bucket": 0.03},
+    endpoint={"swing": 0.6, "boom": 0.065, "stick": 0.08, "bucket": 0.03},
+    progress={"swing": -0.1, "boom": 0.0, "stick": 0.0, "bucket": 0.0},
+    displacement=None,
+    learned=None,
+    any_path=None,
+    sweeps=(),
+    stamp=1.0,
+    published_unix_s=1e9,
+)
+"""The bench machine swings back to its crate."""

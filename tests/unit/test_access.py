@@ -52,7 +52,11 @@ def granted(config: dict[str, Any], name: str, flow: str, message: str) -> set[s
     [
         ("machine, machines: [a]", {"joystick", "actuators", "enabled"}, set()),
         ("object, keys: [rampe/s/truck]", {"rampe/s/truck"}, set()),
-        ("guard, machines: [a]", {"guard/alert", "guard/prediction", "guard/heartbeat"}, set()),
+        (
+            "guard, machines: [a]",
+            {"guard/alert", "guard/prediction", "guard/advice", "guard/heartbeat"},
+            set(),
+        ),
         ("recorder, machines: [a]", {"guard/recorder"}, {"state", "scene"}),
         ("viewer", set(), {"state", "scene"}),
         ("operator, machines: [a]", set(), {"state", "scene", "ack", "shelve"}),

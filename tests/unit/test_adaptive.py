@@ -283,6 +283,7 @@ def size_of(thing: Any, seen: set[int]) -> int:
 
 
 @pytest.mark.no_cover  # nothing that others do not reach, and half as long
+@pytest.mark.no_cover  # thousands of primitives
 def test_only_categories_that_were_seen_cost_memory() -> None:
     """A glove of 28 axes, 3,684 categories of which most are rare, 20,000 primitives by night."""
     rng = np.random.default_rng(0)

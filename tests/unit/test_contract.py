@@ -33,7 +33,7 @@ BY_ACTUATOR = {
 """In the unit of each actuator, rad or m, as its site file says."""
 DIMENSIONLESS = {
     "axes", "category", "borrowed_from", "quaternion_xyzw", "dof",
-    "probability", "share", "contact_fraction",
+    "probability", "share", "negative_share", "positive_share", "contact_fraction",
     "seq", "tick", "observations", "accepted", "rejected", "primitives", "drops", "count",
     "situations", "similar_situations", "similar_contacts", "granted", "refused", "alerts", "steps",
     "categories", "occurrences", "save_failures",

@@ -21,7 +21,7 @@ from rampe_guard.dashboard.picture import Picture
 from rampe_guard.dashboard.sight import Sight
 from rampe_guard.dashboard.tones import Tone
 from rampe_guard.settings import load_site
-from tests.support.messages import ALERT, HEARTBEAT, SILENT_JOYSTICK
+from tests.support.messages import ALERT, HEARTBEAT, SILENT_JOYSTICK, SWINGING
 from tests.support.processes import BENCH
 
 POSITION = np.array([1.0, 0.065, 0.08, 0.03])
@@ -34,27 +34,6 @@ CRATE = structs.replace(
     level="imminent",
     contact_point_m=(0.4, 0.3, 0.1),
     text="bucket → crate in 1.4 s",
-)
-PREDICTION = wire.Prediction(
-    boot_id="boot-1",
-    seq=1,
-    site="bench",
-    machine="bench-excavator",
-    event="started",
-    category=(-1, 0, 0, 0),
-    observations=12,
-    mean={"swing": -0.5, "boom": 0.0, "stick": 0.0, "bucket": 0.0},
-    scale={"swing": 0.1, "boom": 0.0, "stick": 0.0, "bucket": 0.0},
-    dof=None,
-    start={"swing": 1.1, "boom": 0.065, "stick": 0.08, "bucket": 0.03},
-    endpoint={"swing": 0.6, "boom": 0.065, "stick": 0.08, "bucket": 0.03},
-    progress={"swing": -0.1, "boom": 0.0, "stick": 0.0, "bucket": 0.0},
-    displacement=None,
-    learned=None,
-    any_path=None,
-    sweeps=(),
-    stamp=1.0,
-    published_unix_s=1e9,
 )
 
 
@@ -142,7 +121,7 @@ def test_without_protection_nothing_looks_judged(
 ) -> None:
     alerts = (CRATE,) if beat is not None else ()
     state = replace(guard(*alerts, beat=beat), now_s=now_s)
-    seen = replace(sight(state, now_s), prediction=PREDICTION, velocity=np.full(4, 0.3))
+    seen = replace(sight(state, now_s), prediction=SWINGING, velocity=np.full(4, 0.3))
     picture = compose(model, seen)
     assert picture.lost
     assert picture.banner.tone is Tone.LOST
@@ -213,7 +192,7 @@ def test_shelved_is_listed_not_shouted_and_imminent_cannot_be(model: Model) -> N
 
 
 def test_the_usual_way_is_ghosts_to_the_predicted_end(model: Model) -> None:
-    picture = compose(model, replace(sight(guard()), prediction=PREDICTION))
+    picture = compose(model, replace(sight(guard()), prediction=SWINGING))
     assert picture.intent is not None
     assert picture.intent.shape == (INTENT, 5, 4, 4)
     end = model.poses(np.array([[0.6, 0.065, 0.08, 0.03]]))[0]
@@ -228,12 +207,12 @@ def test_the_usual_way_is_ghosts_to_the_predicted_end(model: Model) -> None:
 
 
 def test_two_futures_share_the_ghosts(model: Model) -> None:
-    start = dict(PREDICTION.start)
+    start = dict(SWINGING.start)
     both = tuple(
         wire.prediction.Endpoint(position={**start, "swing": swing}, share=0.5)
         for swing in (0.8, 0.4)
     )
-    forked = structs.replace(PREDICTION, endpoints=both)
+    forked = structs.replace(SWINGING, endpoints=both)
     ghosts = compose(model, replace(sight(guard()), prediction=forked)).intent
     assert ghosts is not None
     for index, swing in ((1, 0.8), (3, 0.4)):
@@ -242,7 +221,7 @@ def test_two_futures_share_the_ghosts(model: Model) -> None:
 
 
 def test_a_way_that_is_already_made_has_no_ghosts(model: Model) -> None:
-    beyond = replace(sight(guard()), prediction=PREDICTION, position=np.array([0.5, *POSITION[1:]]))
+    beyond = replace(sight(guard()), prediction=SWINGING, position=np.array([0.5, *POSITION[1:]]))
     assert compose(model, beyond).intent is None
 
 
@@ -257,7 +236,7 @@ def test_the_stopping_path_is_the_guards_own(model: Model) -> None:
 
 def test_an_old_position_is_stale_and_has_no_future(model: Model) -> None:
     state = replace(guard(), heartbeat_s=102.0, now_s=102.0)
-    old = replace(sight(state, 102.0), prediction=PREDICTION, velocity=np.full(4, 0.3))
+    old = replace(sight(state, 102.0), prediction=SWINGING, velocity=np.full(4, 0.3))
     picture = compose(model, old)
     assert picture.stale
     assert not picture.lost  # its guard says otherwise; it sees the actuators, we do not
@@ -306,12 +285,12 @@ def test_no_more_time_is_promised_than_there_is(seconds: float | None, said: str
 
 
 def test_memory_shows_where_its_likeliest_way_leads_and_how_often_it_did(model: Model) -> None:
-    start = dict(PREDICTION.start)
+    start = dict(SWINGING.start)
     ways = tuple(
         wire.Scenario(share=share, count=count, duration_s=2.5, endpoint={**start, "swing": swing})
         for share, count, swing in ((0.8, 6, 0.3), (0.2, 2, 1.4))
     )
-    seen = replace(sight(guard()), prediction=structs.replace(PREDICTION, scenarios=ways))
+    seen = replace(sight(guard()), prediction=structs.replace(SWINGING, scenarios=ways))
     picture = compose(model, seen)
     assert picture.next is not None
     end = model.poses(np.array([[0.3, 0.065, 0.08, 0.03]]))
@@ -319,7 +298,7 @@ def test_memory_shows_where_its_likeliest_way_leads_and_how_often_it_did(model: 
     assert picture.next_words == "in 6 of 8 similar situations you went on to here"
     assert picture.next_words in side(picture)
     for unfit in (
-        replace(seen, prediction=PREDICTION),
+        replace(seen, prediction=SWINGING),
         replace(seen, now_s=102.0),
         replace(seen, guard=guard(beat=None)),
         replace(seen, position=np.array([0.3, *POSITION[1:]])),

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from rampe_guard.core.types import EnabledSample, Inputs
+from rampe_guard.runtime.decoding import decoders_of
 from rampe_guard.runtime.intake import Intake
 from rampe_guard.runtime.say import Sayer
 from rampe_guard.runtime.worker import arrived
@@ -73,7 +74,9 @@ def intake(post: Post, tmp_path: Path) -> Intake:
     (tmp_path / "arm.urdf").write_text("<robot name='arm'/>", encoding="utf-8")
     (tmp_path / "scene.yaml").write_text(SCENE, encoding="utf-8")
     (tmp_path / "site.yaml").write_text(SITE, encoding="utf-8")
-    return Intake(cast("Bus", post), load_site(tmp_path / "site.yaml"), Sayer("test"))
+    site = load_site(tmp_path / "site.yaml")
+    decoders = decoders_of(site, np.array([[-1.0, 1.0]]))
+    return Intake(cast("Bus", post), site, Sayer("test"), decoders)
 
 
 def test_only_objects_with_a_key_are_subscribed_to(post: Post, intake: Intake) -> None:

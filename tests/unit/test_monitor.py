@@ -2,6 +2,7 @@ import pytest
 
 from rampe_guard.core.config import InputConfig
 from rampe_guard.core.monitor import InputMonitor, Status
+from rampe_guard.core.types import InputName
 
 
 def fed(config: InputConfig | None = None) -> InputMonitor:
@@ -78,12 +79,39 @@ def test_a_refusal_is_counted_named_and_forgiven() -> None:
     monitor = fed(InputConfig(joystick_timeout_s=100, actuators_timeout_s=100))
     for _ in range(3):
         monitor.reject("joystick", "bad_json", 1.0)
+    monitor.accept("joystick", 1.1)
     health = monitor.health(2.0)
     assert health.status is Status.DEGRADED
     assert health.rejected == {("joystick", "bad_json"): 3}
     assert [r.code for r in health.reasons] == ["joystick_bad_json"]
     assert monitor.health(7.0).status is Status.OK
     assert monitor.health(7.0).rejected == {("joystick", "bad_json"): 3}
+
+
+@pytest.mark.parametrize("name", ["joystick", "actuators"])
+@pytest.mark.parametrize("on_change", [False, True])
+def test_an_input_of_which_nothing_is_fit_is_not_waited_for(
+    name: InputName, *, on_change: bool
+) -> None:
+    patient = InputConfig(
+        joystick_timeout_s=100, actuators_timeout_s=100, joystick_on_change=on_change
+    )
+    monitor = fed(patient)
+    for k in range(3):
+        monitor.reject(name, "stamp_jump", 1.05 + 0.01 * k)
+    assert monitor.health(1.2).status is Status.DEGRADED
+    health = monitor.health(1.21)
+    assert health.status is Status.NOT_MONITORING
+    assert health.reasons[0].code == f"{name}_refused"
+    monitor.accept(name, 1.3)
+    assert monitor.health(1.3).status is Status.DEGRADED
+
+
+def test_two_refused_in_a_row_are_a_gap() -> None:
+    monitor = fed(InputConfig(joystick_timeout_s=100, actuators_timeout_s=100))
+    monitor.reject("actuators", "stamp_back", 1.1)
+    monitor.reject("actuators", "stamp_back", 1.2)
+    assert monitor.health(5.0).status is Status.DEGRADED
 
 
 def test_many_refusals_stop_the_learning_for_a_while() -> None:

@@ -12,8 +12,7 @@ from rampe_guard.runtime.scene_kept import (
     NOT_KEPT,
     UNUSABLE,
     SceneKeeper,
-    SceneText,
-    own_scene,
+    SceneSource,
 )
 from rampe_guard.runtime.store import model_folder
 from rampe_guard.settings import Site, load_scene_text, load_site
@@ -40,8 +39,8 @@ def keeper(site: Site) -> SceneKeeper:
     return SceneKeeper(site, Sayer("rampe_guard.test"))
 
 
-def put(site: Site, text: str = OTHER) -> SceneText:
-    source = SceneText(load_scene_text(text, site), text, "ann", 5.0)
+def put(site: Site, text: str = OTHER) -> SceneSource:
+    source = SceneSource(load_scene_text(text, site), "ann", 5.0)
     assert keeper(site).keep(source)
     return source
 
@@ -51,7 +50,7 @@ def test_what_was_put_is_there_again(site: Site) -> None:
     source = put(site)
     again = keeper(site)
     found = again.recall()
-    assert (found.text, found.put_by, found.put_unix_s) == (OTHER, "ann", 5.0)
+    assert (found.scene.text, found.put_by, found.put_unix_s) == (OTHER, "ann", 5.0)
     assert found.scene.content_hash == source.scene.content_hash
     assert (again.problem, again.lost) == (None, None)
 
@@ -60,10 +59,11 @@ def test_a_newer_scene_file_wins(site: Site) -> None:
     put(site)
     own = Path(site.scene.path)
     own.write_text(own.read_text("utf-8") + "# edited\n", "utf-8")
-    edited = keeper(site)
+    again = load_site(site.path)
+    edited = keeper(replace(again, memory=site.memory))
     found = edited.recall()
     assert found.put_by is None
-    assert found.scene.content_hash == own_scene(site).scene.content_hash
+    assert found.scene.content_hash == again.scene.content_hash != site.scene.content_hash
     assert edited.problem is None
 
 
@@ -99,13 +99,13 @@ def test_what_cannot_be_kept_is_told(site: Site) -> None:
     folder.parent.mkdir(parents=True)
     folder.write_text("in the way")
     stuck = keeper(site)
-    assert not stuck.keep(SceneText(load_scene_text(OTHER, site), OTHER, "ann", 5.0))
+    assert not stuck.keep(SceneSource(load_scene_text(OTHER, site), "ann", 5.0))
     assert (stuck.code, stuck.lost) == (NOT_KEPT, None)
     assert str(folder) in (stuck.problem or "")
 
 
 def test_without_memory_nothing_is_kept(site: Site) -> None:
     off = replace(site, memory=replace(site.memory, enabled=False))
-    assert not keeper(off).keep(SceneText(load_scene_text(OTHER, off), OTHER, "ann", 5.0))
+    assert not keeper(off).keep(SceneSource(load_scene_text(OTHER, off), "ann", 5.0))
     assert keeper(off).recall().put_by is None
     assert not model_folder(site).exists()
