@@ -1,11 +1,11 @@
 """A million bad messages and ten thousand bad files: ``python -m tests.benchmarks.fuzz``.
 
-    [--messages 1000000] [--files 10000] [--seed 1] [--jobs 2]
+    [--messages 1000000] [--files 10000] [--seed 1] [--jobs 2] [--cdr]
 
 Messages go through the daemon's own loop (`tests.support.message_fuzz`, which says what must
 hold), files through ``rampe-guard check`` (`tests.support.file_fuzz`), both in processes that may
 die. Prints what was fed, how it was refused, what did not hold, and how long things took; the exit
-code is 1 if anything did not hold. What is CDR is not fuzzed: this version reads JSON alone.
+code is 1 if anything did not hold. With ``--cdr`` joystick and actuators are as ROS 2 sends them.
 """
 
 from __future__ import annotations
@@ -150,10 +150,12 @@ def _told(found: Files, number: int) -> bool:
     return any(f"file {number} hung" in line for line in found.wrong)
 
 
-def fuzz_messages(folder: Path, messages: int, seed: int, found: dict[str, Any]) -> None:
+def fuzz_messages(
+    folder: Path, messages: int, seed: int, encoding: str, found: dict[str, Any]
+) -> None:
     """Feed messages; the newest account of it lands in ``found``."""
     folder.mkdir(parents=True)
-    process = start(folder, "tests.support.message_fuzz", folder, messages, seed)
+    process = start(folder, "tests.support.message_fuzz", folder, messages, seed, encoding)
     lines = lines_of(process)
     try:
         while (line := lines.get(timeout=LOST_S)) is not None:
@@ -210,6 +212,7 @@ def main() -> int:
     parser.add_argument("--files", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--cdr", action="store_true", help="joystick and actuators as ROS 2")
     parser.add_argument("--keep", type=Path, help="a folder for what did not hold")
     args = parser.parse_args()
     kernel_cache.choose_folder()
@@ -226,7 +229,13 @@ def main() -> int:
                 [
                     threading.Thread(
                         target=fuzz_messages,
-                        args=(base / f"messages-{i}", each, args.seed * 100 + i, parts[i]),
+                        args=(
+                            base / f"messages-{i}",
+                            each,
+                            args.seed * 100 + i,
+                            "cdr" if args.cdr else "json",
+                            parts[i],
+                        ),
                     )
                     for i in share
                 ]

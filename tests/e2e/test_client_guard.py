@@ -1,4 +1,4 @@
-"""The README's client programs, as they stand there, beside a real guard."""
+"""The client programs of the documentation, as they stand there, beside a real guard."""
 
 from __future__ import annotations
 
@@ -15,16 +15,17 @@ from tests.support.station import Station
 
 pytestmark = pytest.mark.e2e
 
+PAGE = ROOT / "deploy" / "docs" / "howto" / "integrate.md"
 PROGRAMS = re.findall(
-    r"<!-- run: client -->\n```python\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.DOTALL
+    r"<!-- run: client -->\n```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL
 )
 
 
-def test_the_readme_shows_both_clients() -> None:
+def test_the_page_shows_both_clients() -> None:
     assert ["AsyncAlerts" in text for text in PROGRAMS] == [False, True]
 
 
-def test_the_programs_of_the_readme_and_a_client_follow_a_real_guard(
+def test_the_programs_of_the_page_and_a_client_follow_a_real_guard(
     live: Station, tmp_path: Path
 ) -> None:
     live.calm()

@@ -50,7 +50,7 @@ def one_cycle(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Run]:
     folder = tmp_path_factory.mktemp("demo")
     keys = load_site(DEMO).keys
     parameters = {"joystick": keys.joystick, "actuators": keys.actuators, "base": keys.base}
-    args = ["-m", "rampe_guard", "demo", "--cycles", "1"]
+    args = ["-m", "rampe_guard", "demo", "--cycles", "1", "--obey"]
     with Process(folder, "demo", args) as demo, watched_family(demo) as note:
         demo.wait_for("watching")
         (endpoint,) = re.findall(r"--connect (\S+)", demo.out)
@@ -68,6 +68,7 @@ def test_one_cycle_to_its_summary(one_cycle: Run) -> None:
     assert "lead min" in demo.out
     assert "power-line" in demo.out
     assert "1 cycle" in demo.out
+    assert re.search(r"followed the advice: 0 contacts; a cycle took \d+\.\d s", demo.out)
     assert not (one_cycle.folder / "state").exists()  # a simulated operator is not remembered
     assert "Traceback" not in demo.err
 
@@ -80,6 +81,7 @@ def test_everything_on_the_wire_is_as_the_contract_says(one_cycle: Run) -> None:
         "rampe.actuators.v1",
         "rampe.alert.v1",
         "rampe.prediction.v1",
+        "rampe.advice.v1",
         "rampe.heartbeat.v1",
     }
     assert one_cycle.document.check("state", one_cycle.state, "state") == "rampe.state.v1"

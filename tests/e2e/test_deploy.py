@@ -1,4 +1,4 @@
-"""What deploy/ and the README hand to a site works: with the Zenoh version that we lock, and as far
+"""What deploy/ and its pages hand to a site works: with the Zenoh version that we lock, and as far
 as systemd and the checkers of others can tell."""
 
 import contextlib
@@ -30,8 +30,8 @@ from tests.support.pki import HAVE_OPENSSL
 from tests.support.processes import BENCH, ROOT, Process, free_endpoint, until
 
 pytestmark = pytest.mark.e2e
-README = ROOT / "README.md"
 DEPLOY = ROOT / "deploy"
+SWEEPING = DEPLOY / "docs" / "howto" / "sweep-and-estimate.md"
 UNITS = sorted((DEPLOY / "systemd").glob("*.service"))
 LEAST_EXPOSED = 2.0
 """Of systemd's 10; what is left are the network, and machine code made at run time."""
@@ -57,8 +57,8 @@ def test_the_router_configuration_routes() -> None:
         router.close()
 
 
-def test_the_readme_s_sweep_examples_say_what_they_show() -> None:
-    text = README.read_text()
+def test_the_sweep_examples_say_what_they_show() -> None:
+    text = SWEEPING.read_text()
     shell = re.search(r"echo '(\{.*?\})' \| rampe-guard sweep (\S+)", text)
     assert shell is not None
     lines, site = shell.groups()

@@ -12,11 +12,11 @@ from tests.support.depth import depth
 from tests.support.message_fuzz import fuzz_messages
 
 
-@pytest.mark.parametrize("seed", [1])
+@pytest.mark.parametrize("cdr", [False, True], ids=["json", "cdr"])
 def test_spoilt_messages_neither_stop_a_guard_nor_clear_its_alert(
-    tmp_path: Path, seed: int
+    tmp_path: Path, *, cdr: bool
 ) -> None:
-    found = fuzz_messages(tmp_path, depth(3_000, 200_000), seed)
+    found = fuzz_messages(tmp_path, depth(3_000, 200_000), 1, cdr=cdr)
     assert found.wrong == []
     assert found.judged > 50  # the arm pushed, and was shown to
     assert {"joystick", "actuators", "enabled", "object_pose", "ack", "shelve"} <= found.fed.keys()

@@ -37,6 +37,7 @@ def _machine(name: str, folder: Path) -> tuple[Machine, Arm]:
     return machine(name, folder)
 
 
+@pytest.mark.no_cover  # dense sampling
 @pytest.mark.parametrize("batch", range(len(KINDS)), ids=kind_of)
 @pytest.mark.parametrize("name", MOTIONS)
 def test_dense_search_refutes_no_certificate(name: str, batch: int, folder: Path) -> None:

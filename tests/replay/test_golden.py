@@ -52,6 +52,7 @@ def told(lines: list[bytes]) -> list[list[object]]:
     return kept
 
 
+@pytest.mark.no_cover  # every step of long recordings
 @both
 def test_replay_gives_the_golden_alerts_and_the_same_bytes_twice(name: str) -> None:
     first = alerts(name)
