@@ -58,13 +58,21 @@ class StopFlag:
     def unless_stopped(self, work: Callable[[], T]) -> T | None:
         """The result of ``work()``; None if a signal came before or meanwhile.
 
-        Only for work that may end anywhere: it holds no lock, file or session.
+        Only for work that may end anywhere: it holds no lock, file or session. Libraries on the
+        way may swallow what breaks it off, or raise an error of their own for it: once the flag
+        is set, neither a result nor an error is worth anything.
         """
         try:
             self._at_once = True
-            return None if self() else work()
+            result = None if self() else work()
         except _BrokenOff:
             return None
+        except Exception:
+            if self():
+                return None
+            raise
+        else:
+            return None if self() else result
         finally:
             self._at_once = False
 

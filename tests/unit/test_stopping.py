@@ -4,6 +4,8 @@ import subprocess
 import sys
 import time
 
+import pytest
+
 from rampe_guard.runtime.stopping import StopFlag
 
 
@@ -42,3 +44,26 @@ def test_a_signal_at_any_moment_of_a_busy_loop_ends_it() -> None:
             process.wait()
             if process.stdout is not None:
                 process.stdout.close()
+
+
+@pytest.mark.parametrize("swallowed", [True, False])
+def test_a_library_that_swallows_the_break_makes_no_error_of_it(*, swallowed: bool) -> None:
+    flag = StopFlag()
+
+    def work() -> str:
+        flag.set()
+        if swallowed:
+            return "half of it"
+        raise TypeError("expected str, not BufferedReader")
+
+    assert flag.unless_stopped(work) is None
+
+
+def test_an_error_without_a_stop_is_an_error() -> None:
+    def work() -> str:
+        raise TypeError("broken")
+
+    flag = StopFlag()
+    assert flag.unless_stopped(lambda: "whole") == "whole"
+    with pytest.raises(TypeError, match="broken"):
+        flag.unless_stopped(work)
