@@ -7,12 +7,15 @@ put on an exact key is none to put on a wildcard that holds it.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, Final
 
 from rampe_guard.errors import SettingsError
-from rampe_guard.settings.access import AccessModel, GrantModel, MachineModel, read_access
+from rampe_guard.programs import access_ros2
+from rampe_guard.settings.access import read_access
+from rampe_guard.settings.access_model import AccessModel, GrantModel, MachineModel
+from rampe_guard.settings.ros2_keys import LIVELINESS
 
 MAX_MESSAGE_BYTES: Final = 128 * 1024
 """Twice what the guard takes: the router drops without a word, the guard refuses and counts."""
@@ -158,12 +161,14 @@ def _rules(grant: GrantModel, access: AccessModel) -> Iterator[Rule]:
             yield from _guard(machine, access.read)
     else:
         yield from _reading(access.read)
+        for machine in access.machines:  # as below read: rights to read are not divided
+            yield from _spoken(access_ros2.reader_rights(machine))
         for machine in machines:
             yield from _beyond_reading(grant.role, machine)
 
 
 def _machine(machine: MachineModel) -> Iterator[Rule]:
-    own = (machine.joystick, machine.actuators, machine.enabled)
+    own = (*machine.inputs, machine.enabled)
     yield _rule(f"machine {machine.name}", "ingress", ("put",), own)
     if machine.joystick_alive is not None:
         token = (machine.joystick_alive,)
@@ -171,11 +176,12 @@ def _machine(machine: MachineModel) -> Iterator[Rule]:
     advice = (f"{machine.base}/advice",)
     yield _rule(f"machine {machine.name}: asks", "ingress", ("declare_subscriber",), advice)
     yield _rule(f"machine {machine.name}: is advised", "egress", ("put",), advice)
+    yield from _spoken(access_ros2.machine_rights(machine))
 
 
 def _guard(machine: MachineModel, read: str) -> Iterator[Rule]:
     who, base = f"guard {machine.name}", machine.base
-    taken = (machine.joystick, machine.actuators, machine.enabled, *machine.objects)
+    taken = (*machine.inputs, machine.enabled, *machine.objects)
     asked = tuple(f"{base}/{part}" for part in (*READ, *COMMANDS["engineer"]))
     alive = f"{base}/alive"
     yield _rule(f"{who}: subscribes", "ingress", ("declare_subscriber",), taken)
@@ -191,6 +197,7 @@ def _guard(machine: MachineModel, read: str) -> Iterator[Rule]:
     if machine.joystick_alive is not None:
         watched = (machine.joystick_alive,)
         yield _rule(f"{who}: watches", "ingress", ("declare_liveliness_subscriber",), watched)
+    yield from _spoken(access_ros2.guard_rights(machine))
 
 
 def _reading(read: str) -> Iterator[Rule]:
@@ -210,8 +217,13 @@ def _beyond_reading(role: str, machine: MachineModel) -> Iterator[Rule]:
 
 
 def _everything() -> Rule:
-    rule = _rule("everything", "ingress", EVERYTHING, ("**",))
+    # ** stands for no part that begins with @
+    rule = _rule("everything", "ingress", EVERYTHING, ("**", f"{LIVELINESS}/**"))
     return {**rule, "flows": ["ingress", "egress"]}
+
+
+def _spoken(rights: Iterable[access_ros2.Right]) -> Iterator[Rule]:
+    return (_rule(*right) for right in rights)
 
 
 def _rule(name: str, flow: str, messages: tuple[str, ...], keys: tuple[str | None, ...]) -> Rule:
@@ -258,7 +270,7 @@ def _rates(access: AccessModel) -> list[dict[str, Any]]:
         key: machine.max_rate_hz
         for machine in access.machines
         if machine.max_rate_hz is not None
-        for key in (machine.joystick, machine.actuators, machine.enabled, *machine.objects)
+        for key in (*machine.inputs, machine.enabled, *machine.objects)
         if key is not None
     }
     rules = [{"key_expr": key, "freq": rate} for key, rate in rates.items()]

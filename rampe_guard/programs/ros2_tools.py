@@ -16,17 +16,9 @@ from rampe_guard.recording.bag import is_bag, opened
 from rampe_guard.ros2 import cdr
 from rampe_guard.ros2.outputs import encode_joint_state, encode_joy
 from rampe_guard.runtime.connecting import connect_to
-from rampe_guard.runtime.ros2_publisher import DIAGNOSTICS_TOPIC, markers_topic
 from rampe_guard.runtime.zenoh_io import Bus
 from rampe_guard.settings import Site, load_site
-from rampe_guard.settings.ros2_keys import (
-    DIAGNOSTICS,
-    JOINT_STATE,
-    JOY,
-    MARKERS,
-    STRING,
-    Ros2Settings,
-)
+from rampe_guard.settings.ros2_keys import JOINT_STATE, JOY, STRING, Ros2Settings
 
 MOST_URDF: Final = 16 * 2**20
 """A description may be so large [bytes]."""
@@ -43,10 +35,8 @@ def topics(site: Site) -> list[tuple[str, str, str, str]]:
         ("hears", ros.joystick_topic, JOY.name, site.keys.joystick),
         ("hears", ros.actuators_topic, JOINT_STATE.name, site.keys.actuators),
     ]
-    if ros.publish:
-        said = ((DIAGNOSTICS_TOPIC, DIAGNOSTICS), (markers_topic(ros), MARKERS))
-        found += [("says", topic, kind.name, ros.key(topic, kind)) for topic, kind in said]
-    return found
+    said = [("says", topic, kind.name, ros.key(topic, kind)) for topic, kind in ros.published]
+    return [*found, *said]
 
 
 def joints(site: Site) -> tuple[str, ...]:

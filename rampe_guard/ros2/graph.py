@@ -12,10 +12,18 @@ Slashes inside of a part are written %, and what is empty is %, too.
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
-from rampe_guard.settings.ros2_keys import NO_HASH, Ros2Settings, RosType
+from rampe_guard.settings.ros2_keys import (
+    LIVELINESS,
+    NO_HASH,
+    Ros2Settings,
+    RosType,
+    strangers,
+    topic_of,
+)
 
 _NODE_ID: Final = 0
 _FIRST_ENTITY: Final = 10
@@ -29,7 +37,7 @@ class Voice:
 
     Attributes:
         settings: domain and name.
-        zid: of the Zenoh session.
+        zid: of the Zenoh session; ``*`` makes key expressions for that of any.
     """
 
     settings: Ros2Settings
@@ -54,8 +62,35 @@ class Voice:
         )
 
     @property
+    def tokens(self) -> tuple[str, ...]:
+        """All tokens of the guard: its node, and what that publishes."""
+        said = enumerate(self.settings.published)
+        return (self.node, *(self.publisher(at, topic, kind) for at, (topic, kind) in said))
+
+    @property
     def _session(self) -> str:
-        return f"@ros2_lv/{self.settings.domain}/{self.zid}"
+        return f"{LIVELINESS}/{self.settings.domain}/{self.zid}"
+
+
+def driver_tokens(node: str, keys: Iterable[str]) -> tuple[str, ...]:
+    """Key expressions of the tokens of another node, and of its publishers on keys of rmw_zenoh.
+
+    Open are session, numbers, enclave and QoS, all of which the node chooses when it starts.
+
+    Args:
+        node: its full name, as in ``/arm/joy_node``.
+        keys: that it publishes on; those of no topic have no token.
+    """
+    namespace, _, name = node.rpartition("/")
+    who = f"{namespace.replace('/', '%') or '%'}/{name}"
+    found: dict[str, None] = {}  # each once, in their order
+    for key in keys:
+        if strangers(key) is not None:
+            any_of = f"{LIVELINESS}/{key.split('/')[0]}/*/*/*"
+            kind = "/".join(key.split("/")[-2:])
+            found[f"{any_of}/NN/*/{who}"] = None
+            found[f"{any_of}/MP/*/{who}/{topic_of(key).replace('/', '%')}/{kind}/*"] = None
+    return tuple(found)
 
 
 def gid_of(token: str) -> bytes:

@@ -25,20 +25,14 @@ from rampe_guard.ros2.markers import Painter
 from rampe_guard.ros2.shapes import Ghost, Solid, zones
 from rampe_guard.runtime.say import Sayer
 from rampe_guard.runtime.zenoh_io import Bus
-from rampe_guard.settings.ros2_keys import DIAGNOSTICS, MARKERS, Ros2Settings, RosType
+from rampe_guard.settings.ros2_keys import Ros2Settings, RosType
 
-DIAGNOSTICS_TOPIC: Final = "/diagnostics"
 _LOOK_S: Final = 0.2
 """Five marker arrays a second, at most."""
 _DIAGNOSTICS_S: Final = 1.0
 _ZONES_S: Final = 0.5
 _SILENT_S: Final = 1.0
 _END_S: Final = 2.0
-
-
-def markers_topic(ros: Ros2Settings) -> str:
-    """Where the markers of a site are."""
-    return f"/{ros.node}/markers"
 
 
 class Publisher:
@@ -98,8 +92,10 @@ class RosVoice:
         self._machine, self._node, self._say = site.machine, ros.node, say
         if ros.transport == "rmw_zenoh":
             bus.declare_alive(Voice(ros, bus.zid).node)
-        self._diagnostics = Publisher(bus, ros, 0, DIAGNOSTICS_TOPIC, DIAGNOSTICS)
-        self._markers = Publisher(bus, ros, 1, markers_topic(ros), MARKERS)
+        self._diagnostics, self._markers = (
+            Publisher(bus, ros, number, topic, kind)
+            for number, (topic, kind) in enumerate(ros.published)
+        )
         self._painter = Painter(Ghost(machine.arm), site.actuator_names, ros.frame)
         self._scene: Scene | None = site.scene
         self._solids: Mapping[str, tuple[Solid, ...]] = MappingProxyType({})
@@ -192,10 +188,11 @@ def ros_voice(bus: Bus, machine: Machine, say: Sayer) -> Iterator[RosVoice | Non
     if ros is None or not ros.publish:
         yield None
         return
-    for kind in (DIAGNOSTICS, MARKERS):  # its code is made before the guard is at work
+    for _, kind in ros.published:  # its code is made before the guard is at work
         cdr.store().get_msgdef(kind.name)
     with RosVoice(bus, machine, ros, say) as voice:
-        say.info(f"ROS 2: node {ros.node} on {DIAGNOSTICS_TOPIC} and {markers_topic(ros)}")
+        topics = " and ".join(topic for topic, _ in ros.published)
+        say.info(f"ROS 2: node {ros.node} on {topics}")
         yield voice
 
 

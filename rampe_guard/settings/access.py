@@ -1,4 +1,4 @@
-"""The access list of a site: its machines, its routers, and which certificate may do what.
+"""Access lists: read, and what is wrong with one.
 
 One file that a site edits (`deploy/access.example.yaml`); `programs/access.py` makes a router's
 configuration of it.
@@ -8,97 +8,17 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable
-from typing import Annotated, Literal
 
-from pydantic import Field
-
+from rampe_guard.settings.access_model import (
+    OF_MACHINES,
+    AccessModel,
+    MachineModel,
+    RouterModel,
+)
 from rampe_guard.settings.explain import validate
-from rampe_guard.settings.model import Model, Name, Text
 from rampe_guard.settings.problems import KeyPath, Problems, did_you_mean, show
+from rampe_guard.settings.ros2_keys import DIAGNOSTICS, DIAGNOSTICS_TOPIC, MARKERS
 from rampe_guard.settings.source import Document, parse, read_bytes
-
-Key = Annotated[str, Field(pattern=r"^[^/*$?#\s]+(/[^/*$?#\s]+)*$", max_length=256)]
-"""An exact Zenoh key: no wildcard, no slash at an end."""
-
-Role = Literal["machine", "object", "guard", "recorder", "viewer", "operator", "engineer", "router"]
-OF_MACHINES = ("machine", "guard")
-"""Roles that must say of which machines: nobody is the guard of all of them by default."""
-
-
-class RouterModel(Model):
-    """How the router is reached."""
-
-    listen: Annotated[tuple[Text, ...], Field(min_length=1, max_length=8)] = Field(
-        default=("tls/0.0.0.0:7447",),
-        description="The TLS endpoints to listen on, such as tls/0.0.0.0:7447.",
-    )
-    connect: tuple[Text, ...] = Field(
-        default=(), description="The TLS endpoints of other routers of the site."
-    )
-    certificates: Text = Field(
-        description="The folder with ca.crt, tls.crt and tls.key, as the router sees it."
-    )
-    plain_loopback_port: Annotated[int, Field(ge=1, le=65535)] | None = Field(
-        default=None,
-        description="The port on 127.0.0.1 on which every process of the router's own host may do "
-        "everything, without TLS; left out: none.",
-    )
-
-
-class MachineModel(Model):
-    """A machine: the keys that its site file and its scene file name."""
-
-    name: Name = Field(description="The name of the machine; unique.")
-    base: Key = Field(description="The prefix of every key that its guard publishes.")
-    joystick: Key = Field(description="The key the joystick is published on.")
-    actuators: Key = Field(description="The key the actuator positions are published on.")
-    enabled: Key | None = Field(
-        default=None, description="The key on which it says whether it is switched on."
-    )
-    joystick_alive: Key | None = Field(
-        default=None, description="The key of the joystick's liveliness token."
-    )
-    objects: tuple[Key, ...] = Field(
-        default=(), description="The keys of the poses that its guard reads."
-    )
-    max_rate_hz: Annotated[float, Field(ge=1.0, le=100_000.0)] | None = Field(
-        default=2000.0,
-        description="The most that the router lets through on each input of it [1/s]; of what "
-        "comes at once the first goes through. null: all, for senders that publish on change.",
-    )
-
-
-class GrantModel(Model):
-    """What the bearer of a certificate may do; several of one certificate add up."""
-
-    certificate: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")] = Field(
-        description="The common name of the certificate."
-    )
-    role: Role = Field(description="The role.")
-    machines: Annotated[tuple[Name, ...], Field(min_length=1)] | None = Field(
-        default=None,
-        description="The machines that it is for; left out: all (machine and guard must say).",
-    )
-    keys: Annotated[tuple[Key, ...], Field(min_length=1)] | None = Field(
-        default=None, description="The keys that an object publishes its poses on."
-    )
-
-
-class AccessModel(Model):
-    """The access list."""
-
-    router: RouterModel = Field(description="The router.")
-    read: Annotated[str, Field(pattern=r"^[^/*$?#\s]+(/[^/*$?#\s]+)*/\*\*$")] = Field(
-        default="rampe/**",
-        description="The keys that everyone with a reading role may read, ending with /**; all "
-        "keys of all machines lie below it.",
-    )
-    machines: Annotated[tuple[MachineModel, ...], Field(min_length=1)] = Field(
-        description="The machines."
-    )
-    access: Annotated[tuple[GrantModel, ...], Field(min_length=1)] = Field(
-        description="The certificates and their roles."
-    )
 
 
 def read_access(path: str) -> AccessModel:
@@ -141,28 +61,77 @@ def _check_endpoints(router: RouterModel, add: _Add) -> None:
 
 def _check_machines(access: AccessModel, add: _Add) -> None:
     within = access.read.removesuffix("**")
-    owned = Counter(
-        key
-        for machine in access.machines
-        for key in (machine.name, machine.base, machine.joystick, machine.actuators)
-    )
+    owned = Counter(key for machine in access.machines for _, key in _owned(machine))
+    shared = {key for machine in access.machines if (key := _diagnostics(machine)) is not None}
     for place, machine in enumerate(access.machines):
-        for field in ("name", "base", "joystick", "actuators"):
-            if owned[value := getattr(machine, field)] > 1:
-                what = f"{show(value)} is there twice"
-                add(("machines", place, field), what, "give each machine its own")
+        at: KeyPath = ("machines", place)
+        for field, key in _owned(machine):
+            if owned[key] > 1:
+                add((*at, field), f"{show(key)} is there twice", _OWN[field])
+            if field in _INPUTS and key in shared:
+                what = f"{show(key)} is where guards publish their diagnostics"
+                add((*at, field), what, "give another topic")
         for field, key in _keys(machine):
             if not key.startswith(within):
                 what = f"{show(key)} is not below read, {access.read}"
-                add(("machines", place, field), what, "rename it, or widen read")
+                add((*at, field), what, "rename it, or widen read")
+        _check_ros2(machine, at, add)
+    _check_nodes(access, add)
+
+
+_INPUTS = ("joystick", "actuators")
+_OWN = {
+    **dict.fromkeys(("name", "base", *_INPUTS), "give each machine its own"),
+    "ros2": "give each guard its own node, or domain",
+}
+
+
+def _owned(machine: MachineModel) -> Iterable[tuple[str, str]]:
+    """What no other machine may have: names and keys, and the field that says each."""
+    yield from (("name", machine.name), ("base", machine.base))
+    yield from machine.speech.keys.items()
+    ros = machine.speech.settings
+    if ros is not None and ros.publish:
+        yield "ros2", ros.key(ros.markers_topic, MARKERS)
+
+
+def _diagnostics(machine: MachineModel) -> str | None:
+    """Where its guard says in ROS 2 how it is: a topic that all of a domain share."""
+    ros = machine.speech.settings
+    return ros.key(DIAGNOSTICS_TOPIC, DIAGNOSTICS) if ros is not None and ros.publish else None
 
 
 def _keys(machine: MachineModel) -> Iterable[tuple[str, str]]:
-    for field in ("base", "joystick", "actuators", "enabled", "joystick_alive"):
+    """Keys that must lie below read; topics lie where ROS 2 has them."""
+    inputs = _INPUTS if machine.format == "json" else ()
+    for field in ("base", *inputs, "enabled", "joystick_alive"):
         if (key := getattr(machine, field)) is not None:
             yield field, key
     for key in machine.objects:
         yield "objects", key
+
+
+def _check_ros2(machine: MachineModel, at: KeyPath, add: _Add) -> None:
+    for field, what, remedy in machine.speech.wrongs():
+        add((*at, field), what, remedy)
+    if machine.format == "json":
+        for field in _INPUTS:
+            if (said := getattr(machine, field)).startswith("/"):
+                what = f"{show(said)} begins with a slash"
+                add((*at, field), what, "give a Zenoh key, or write format: ros2 beside a topic")
+
+
+def _check_nodes(access: AccessModel, add: _Add) -> None:
+    spoken = [machine.speech.settings for machine in access.machines]
+    guards = {(ros.domain, f"/{ros.node}") for ros in spoken if ros is not None}
+    for place, (machine, ros) in enumerate(zip(access.machines, spoken, strict=True)):
+        if machine.ros2_nodes and (ros is None or ros.transport != "rmw_zenoh"):
+            what = "is given, and only nodes of rmw_zenoh show themselves"
+            add(("machines", place, "ros2_nodes"), what, "leave it out")
+        for index, node in enumerate(machine.ros2_nodes):
+            if ros is not None and (ros.domain, node) in guards:
+                what = f"{show(node)} is the node of a guard"
+                add(("machines", place, "ros2_nodes", index), what, "name the driver's own node")
 
 
 def _check_grants(access: AccessModel, add: _Add) -> None:

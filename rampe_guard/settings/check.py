@@ -9,7 +9,7 @@ from rampe_guard.settings.drive_model import impossible
 from rampe_guard.settings.network import PROVEN, protocol, shown
 from rampe_guard.settings.problems import KeyPath, Problems, did_you_mean, show
 from rampe_guard.settings.published import PUBLISHED
-from rampe_guard.settings.ros2_model import INPUTS, check_ros2, exact_key
+from rampe_guard.settings.ros2_model import check_ros2, speech_of
 from rampe_guard.settings.site_model import (
     ArmModel,
     ColumnModel,
@@ -49,7 +49,7 @@ def check(model: SiteModel, problems: Problems) -> None:
 
 def _keys(model: SiteModel, problems: Problems) -> None:
     keys: list[tuple[KeyPath, str]] = [
-        *((("keys", name), exact_key(model, name, kind)) for name, kind in INPUTS),
+        *((("keys", name), key) for name, key in speech_of(model).keys.items()),
         (("keys", "base"), model.keys.base),
     ]
     if model.keys.enabled is not None:

@@ -14,6 +14,12 @@ Transport: TypeAlias = Literal["rmw_zenoh", "ros2dds"]
 
 NO_HASH: Final = "TypeHashNotSupported"
 """What stands for the hash where ROS 2 knows none: in Humble."""
+DIAGNOSTICS_TOPIC: Final = "/diagnostics"
+"""Where everybody in ROS 2 says how he is."""
+LIVELINESS: Final = "@ros2_lv"
+"""The first part of the tokens by which rmw_zenoh tells who is there."""
+MOST_DOMAIN: Final = 232
+"""The highest ROS_DOMAIN_ID."""
 _TOPIC = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 _DDS = "::dds_::"
 
@@ -81,6 +87,18 @@ class Ros2Settings:
     joystick_topic: str
     actuators_topic: str
 
+    @property
+    def markers_topic(self) -> str:
+        """Where the guard's markers are."""
+        return f"/{self.node}/markers"
+
+    @property
+    def published(self) -> tuple[tuple[str, RosType], ...]:
+        """Topics of the guard, each at the place that is its number in the ROS graph."""
+        if not self.publish:
+            return ()
+        return (DIAGNOSTICS_TOPIC, DIAGNOSTICS), (self.markers_topic, MARKERS)
+
     def key(self, topic: str, kind: RosType) -> str:
         """The Zenoh key of a topic."""
         return key_of(topic, kind, self.transport, self.domain, type_hash=self.type_hash)
@@ -128,7 +146,17 @@ def why_strange(found: str, expected: str) -> tuple[str, str]:
     theirs, ours = found.split("/")[-2:], expected.split("/")[-2:]
     if theirs[0] != ours[0]:
         return "wrong_type", f"somebody publishes {theirs[0]} there, not {ours[0]}"
-    return "wrong_hash", f"somebody's {ours[0]} has the hash {theirs[1]}, not {ours[1]}"
+    text = f"somebody's {ours[0]} has the hash {theirs[1]}, not {ours[1]}"
+    humble = f"{text} (so does ROS 2 Humble: type_hash is false)"
+    return "wrong_hash", humble if theirs[1] == NO_HASH else text
+
+
+def in_words(key: str) -> str:
+    """How a key would be told to ``ros2``: its topic and how it travels; any other as it is."""
+    parts = key.split("/")
+    if not _is_rmw(parts):
+        return key
+    return f"{topic_of(key)} of {parts[-2]} (rmw_zenoh, domain {parts[0]})"
 
 
 def _is_rmw(parts: list[str]) -> bool:

@@ -1,7 +1,9 @@
-"""The part of a site file that says how ROS 2 is spoken, and what is wrong with it."""
+"""The part of a site file, or of an access list, that says how ROS 2 is spoken."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
@@ -28,7 +30,7 @@ class Ros2Model(Model):
         description="What lies between ROS 2 and Zenoh: rmw_zenoh, or ros2dds (the bridge "
         "zenoh-plugin-ros2dds).",
     )
-    domain: Annotated[int, Field(ge=0, le=232)] = Field(
+    domain: Annotated[int, Field(ge=0, le=ros2_keys.MOST_DOMAIN)] = Field(
         default=0, description="The ROS_DOMAIN_ID, which is part of the keys of rmw_zenoh."
     )
     type_hash: bool = Field(
@@ -49,38 +51,64 @@ class Ros2Model(Model):
     )
 
 
-def exact_key(model: SiteModel, name: str, kind: RosType) -> str:
-    """``keys.NAME`` as a Zenoh key, also where it is a topic."""
-    said: str = getattr(model.keys, name)
-    if model.format != "ros2" or not said.startswith("/"):
-        return said
-    ros = model.ros2 or Ros2Model()
-    return ros2_keys.key_of(said, kind, ros.transport, ros.domain, type_hash=ros.type_hash)
+@dataclass(frozen=True, slots=True)
+class Speech:
+    """What a file says of how one machine speaks.
+
+    Attributes:
+        format: of the messages.
+        block: how ROS 2 is spoken, if it says that.
+        said: both inputs by their names in `INPUTS`, each a Zenoh key or a topic.
+    """
+
+    format: str
+    block: Ros2Model | None
+    said: Mapping[str, str]
+
+    @property
+    def keys(self) -> dict[str, str]:
+        """Both inputs as Zenoh keys."""
+        return {name: self._key(self.said[name], kind) for name, kind in INPUTS}
+
+    @property
+    def settings(self) -> Ros2Settings | None:
+        """The block as values; None where the format is another."""
+        if self.format != "ros2":
+            return None
+        joystick, actuators = map(ros2_keys.topic_of, self.keys.values())
+        said = self.block or Ros2Model()
+        return Ros2Settings(**said.model_dump(), joystick_topic=joystick, actuators_topic=actuators)
+
+    def wrongs(self) -> Iterator[tuple[str, str, str]]:
+        """What is wrong with topics, whole keys and the block: where, what, and what to do."""
+        if self.format != "ros2":
+            if self.block is not None:
+                yield "ros2", "is given, and format is json", "write format: ros2 beside it"
+            return
+        for name, kind in INPUTS:
+            said = self.said[name]
+            if said.startswith("/"):
+                if not ros2_keys.is_topic(said):
+                    what = f"{show(said)} is no ROS 2 topic"
+                    yield name, what, "give its full name, such as /arm/joint_states"
+            elif why := ros2_keys.wrong_type(said, kind):
+                yield name, f"{show(said)} {why}", "give the topic instead, such as /joy"
+
+    def _key(self, said: str, kind: RosType) -> str:
+        if self.format != "ros2" or not said.startswith("/"):
+            return said
+        ros = self.block or Ros2Model()
+        return ros2_keys.key_of(said, kind, ros.transport, ros.domain, type_hash=ros.type_hash)
+
+
+def speech_of(model: SiteModel) -> Speech:
+    """What a site file says of it."""
+    said = {name: getattr(model.keys, name) for name, _ in INPUTS}
+    return Speech(model.format, model.ros2, said)
 
 
 def check_ros2(model: SiteModel, problems: Problems) -> None:
     """Add what is wrong with topics, whole keys and the block itself."""
-    if model.format != "ros2":
-        if model.ros2 is not None:
-            problems.add(("ros2",), "is given, and format is json", "write format: ros2 beside it")
-        return
-    for name, kind in INPUTS:
-        said: str = getattr(model.keys, name)
-        path: KeyPath = ("keys", name)
-        if said.startswith("/"):
-            if not ros2_keys.is_topic(said):
-                what = f"{show(said)} is no ROS 2 topic"
-                problems.add(path, what, "give its full name, such as /arm/joint_states")
-        elif why := ros2_keys.wrong_type(said, kind):
-            problems.add(path, f"{show(said)} {why}", "give the topic instead, such as /joy")
-
-
-def ros2_settings(model: SiteModel) -> Ros2Settings | None:
-    """The same as values; None where the format is another."""
-    if model.format != "ros2":
-        return None
-    joystick, actuators = (
-        ros2_keys.topic_of(exact_key(model, name, kind)) for name, kind in INPUTS
-    )
-    said = model.ros2 or Ros2Model()
-    return Ros2Settings(**said.model_dump(), joystick_topic=joystick, actuators_topic=actuators)
+    for where, what, remedy in speech_of(model).wrongs():
+        path: KeyPath = (where,) if where == "ros2" else ("keys", where)
+        problems.add(path, what, remedy)

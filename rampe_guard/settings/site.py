@@ -31,7 +31,7 @@ from rampe_guard.settings.check import check
 from rampe_guard.settings.explain import validate
 from rampe_guard.settings.model import MAX_NAME, Name
 from rampe_guard.settings.problems import KeyPath, Problems, show
-from rampe_guard.settings.ros2_model import INPUTS, exact_key, ros2_settings
+from rampe_guard.settings.ros2_model import speech_of
 from rampe_guard.settings.scene import existing_file, load_scene, parse_scene, pose_matrix
 from rampe_guard.settings.site_model import (
     DEFAULT_ENDPOINT,
@@ -78,9 +78,9 @@ def load_site(path: str | Path, *, within: str | Path | None = None) -> Site:
     urdf = existing_file(problems, ("arm", "urdf"), directory, arm.urdf, "URDF file", folders)
     zenoh = _zenoh(model.zenoh, directory, folders, problems)
     names = tuple(a.name for a in arm.actuators)
-    exact = {name: exact_key(model, name, kind) for name, kind in INPUTS}
+    speech = speech_of(model)
     alive = model.inputs.joystick.alive_key
-    keys = Keys(**{**model.keys.model_dump(), **exact}, joystick_alive=alive)
+    keys = Keys(**{**model.keys.model_dump(), **speech.keys}, joystick_alive=alive)
     scene = Scene(())
     scene_file = existing_file(problems, ("scene",), directory, model.scene, "scene file", folders)
     if scene_file is not None:
@@ -110,7 +110,7 @@ def load_site(path: str | Path, *, within: str | Path | None = None) -> Site:
         metrics=None if model.metrics is None else MetricsSettings(**model.metrics.model_dump()),
         self_collision=_self_collision(model.self_collision),
         folders=folders,
-        ros2=ros2_settings(model),
+        ros2=speech.settings,
     )
 
 

@@ -6,48 +6,26 @@ import contextlib
 import json
 import math
 import signal
-import threading
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import pytest
-import zenoh
 
-from rampe_guard.ros2 import cdr
 from rampe_guard.ros2.attachment import unpacked
 from rampe_guard.settings import Site, load_site
-from rampe_guard.settings.ros2_keys import DIAGNOSTICS, JOINT_STATE, JOY, MARKERS
+from rampe_guard.settings.ros2_keys import JOINT_STATE, JOY
 from tests.support import processes
 from tests.support.ears import Ears
 from tests.support.processes import BENCH, Process, until
-from tests.support.ros2 import angles_of, bench_in_ros2, joint_state, joy
+from tests.support.ros2 import RosEars, angles_of, bench_in_ros2, joint_state, joy
 from tests.support.station import REST
 
 pytestmark = pytest.mark.e2e
 
 BASE = "rampe/bench/ros2/guard"
 SENDER = ("-m", "tests.support.ros2_sender")
-
-
-@dataclass
-class RosEars:
-    """Messages of one type: key, attachment, and what the bytes say."""
-
-    heard: list[tuple[str, bytes | None, Any]] = field(default_factory=list)
-    lock: threading.Lock = field(default_factory=threading.Lock)
-
-    def all(self) -> list[tuple[str, bytes | None, Any]]:
-        with self.lock:
-            return list(self.heard)
-
-    def hear(self, sample: zenoh.Sample) -> None:
-        kind = DIAGNOSTICS if DIAGNOSTICS.dds in str(sample.key_expr) else MARKERS
-        attached = None if sample.attachment is None else sample.attachment.to_bytes()
-        said = cdr.decode(sample.payload.to_bytes(), kind, 4_000_000)
-        with self.lock:
-            self.heard.append((str(sample.key_expr), attached, said))
 
 
 @dataclass

@@ -1,10 +1,13 @@
-"""A router and a guard of the bench site as a site would protect them: all from deploy/."""
+"""A router and a guard of the bench site as a site would protect them: all from deploy/.
+
+The machine speaks JSON (`PLAIN`), or whatever another `Plan` says.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,7 +41,30 @@ access:
   - {{certificate: operator, role: operator}}
   - {{certificate: engineer, role: engineer}}
 """
-NAMES = tuple(re.findall(r"certificate: (\w+)", ACCESS))
+
+Site = Callable[[Path, str, str], Path]
+"""Of a folder, a block of YAML and a name: makes the machine's site file with that block."""
+
+
+def _bench(folder: Path, more: str, name: str) -> Path:
+    return bench_copy(folder, more, name=name)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is protected: the access list, where its guard publishes, and its site file."""
+
+    access: str
+    base: str
+    site: Site
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Certificates on the list."""
+        return tuple(dict.fromkeys(re.findall(r"certificate: (\w+)", self.access)))
+
+
+PLAIN = Plan(ACCESS, BASE, _bench)
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 
 
@@ -46,6 +72,7 @@ _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 class Fort:
     """What an attacker finds."""
 
+    plan: Plan
     folder: Path
     pki: Pki
     endpoint: str
@@ -59,7 +86,7 @@ class Fort:
 
     def site(self, name: str) -> Path:
         """The machine's site file for the bearer of a certificate."""
-        return _site(self.folder, self.endpoint, name)
+        return _site(self.plan, self.folder, self.endpoint, name)
 
     def logged(self, *words: str, within_s: float = 5.0) -> None:
         """Wait for a line in the router's log that has all of these words."""
@@ -75,10 +102,10 @@ class Fort:
         self.logged(f"CertCommonName({name})", f"is unauthorized to {what} (ingress) on {key}")
 
 
-def write_access(folder: Path, pki: Pki, endpoint: str) -> Path:
+def write_access(plan: Plan, folder: Path, pki: Pki, endpoint: str) -> Path:
     """The router's configuration, by the command that sites use."""
     listed, made = folder / "access.yaml", folder / "router.json5"
-    text = ACCESS.replace("PLACE", endpoint.partition("/")[2]).replace("PKI", str(pki.folder))
+    text = plan.access.replace("PLACE", endpoint.partition("/")[2]).replace("PKI", str(pki.folder))
     listed.write_text(text, "utf-8")
     done = processes.called("access", listed, "--out", made)
     assert done.returncode == 0, done.stderr
@@ -94,30 +121,31 @@ def secure_router(folder: Path, config: Path) -> Process:
     return started(process, "ready")
 
 
-def _site(folder: Path, endpoint: str, name: str) -> Path:
+def _site(plan: Plan, folder: Path, endpoint: str, name: str) -> Path:
     files = {"root_ca": "ca.crt", "certificate": "tls.crt", "key": "tls.key"}
     tls = ", ".join(f"{key}: pki/{name}/{file}" for key, file in files.items())
     secure = endpoint.replace("tcp/", "tls/")
-    return bench_copy(folder, f"zenoh: {{connect: [{secure}], tls: {{{tls}}}}}", name=name)
+    return plan.site(folder, f"zenoh: {{connect: [{secure}], tls: {{{tls}}}}}", name)
 
 
 @contextlib.contextmanager
-def fort(folder: Path) -> Iterator[Fort]:
+def fort(folder: Path, plan: Plan = PLAIN) -> Iterator[Fort]:
     """Build it; end all."""
     pki = Pki(folder / "pki")
     pki.router("router")
-    for name in NAMES:
+    for name in plan.names:
         if name not in ("soon", "old"):
             pki.issue(name)
     pki.issue_for("old", -60.0)
     pki.issue("stranger")
     endpoint = processes.free_endpoint()
     with contextlib.ExitStack() as stack:
-        router = stack.enter_context(secure_router(folder, write_access(folder, pki, endpoint)))
-        ears = stack.enter_context(Ears(pki.at(endpoint, "viewer"), BASE))
-        args = ["-m", "rampe_guard", "run", str(_site(folder, endpoint, "guard"))]
+        config = write_access(plan, folder, pki, endpoint)
+        router = stack.enter_context(secure_router(folder, config))
+        ears = stack.enter_context(Ears(pki.at(endpoint, "viewer"), plan.base))
+        args = ["-m", "rampe_guard", "run", str(_site(plan, folder, endpoint, "guard"))]
         guard = stack.enter_context(Process(folder, "guard", args))
         guard.wait_for("guarding on")
-        yield Fort(folder, pki, endpoint, router, guard, ears)
+        yield Fort(plan, folder, pki, endpoint, router, guard, ears)
         assert guard.alive, guard.err
         assert "Traceback" not in guard.err, guard.err

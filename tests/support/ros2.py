@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import zenoh
 
 from rampe_guard.core.drive import joint_scalar
 from rampe_guard.ros2 import cdr
 from rampe_guard.ros2.attachment import Attachment
 from rampe_guard.ros2.graph import gid_of
 from rampe_guard.settings import Site
-from rampe_guard.settings.ros2_keys import JOINT_STATE, JOY
+from rampe_guard.settings.ros2_keys import DIAGNOSTICS, JOINT_STATE, JOY, MARKERS
 from tests.support.processes import BENCH
 
 GID = gid_of("a driver")
@@ -68,6 +72,25 @@ def bench_in_ros2(folder: Path, transport: str = "rmw_zenoh", more: str = "") ->
     path = folder / f"bench-{transport}.yaml"
     path.write_text(f"{text}\nformat: ros2\nros2: {{transport: {transport}{more}}}\n", "utf-8")
     return path
+
+
+@dataclass
+class RosEars:
+    """Diagnostics or markers: key, attachment, and what the bytes say."""
+
+    heard: list[tuple[str, bytes | None, Any]] = field(default_factory=list)
+    lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def all(self) -> list[tuple[str, bytes | None, Any]]:
+        with self.lock:
+            return list(self.heard)
+
+    def hear(self, sample: zenoh.Sample) -> None:
+        kind = DIAGNOSTICS if "diagnostics" in str(sample.key_expr) else MARKERS
+        attached = None if sample.attachment is None else sample.attachment.to_bytes()
+        said = cdr.decode(sample.payload.to_bytes(), kind, 4_000_000)
+        with self.lock:
+            self.heard.append((str(sample.key_expr), attached, said))
 
 
 class Sender:

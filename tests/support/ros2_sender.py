@@ -1,6 +1,6 @@
 """Two machines that move alike, in one process: one speaks as rmw_zenoh does, the other JSON.
 
-    python -m tests.support.ros2_sender ENDPOINT ROS-SITE JSON-SITE
+    python -m tests.support.ros2_sender ENDPOINT ROS-SITE [JSON-SITE]
 
 Both stand, swing at the crate with the lever pushed, stall at it, are let go, and swing back. Lines
 of JSON on stdin then put single messages of ROS 2, ``{"key": KEY, "hex": BYTES}``, or let
@@ -76,10 +76,11 @@ class Speaker:
         self._senders[key].sequence += count
 
 
-def main(endpoint: str, ros_path: str, json_path: str) -> None:
-    """Play the script, and obey."""
+def main(endpoint: str, *paths: str) -> None:
+    """Play the script, and obey; single messages are of the first site."""
     session = open_session(endpoint)
-    ros, plain = (Speaker(session, load_site(path)) for path in (ros_path, json_path))
+    speakers = [Speaker(session, load_site(path)) for path in paths]
+    ros = speakers[0]
     over, words = threading.Event(), queue.SimpleQueue[dict[str, Any]]()
 
     def hear() -> None:
@@ -93,8 +94,8 @@ def main(endpoint: str, ros_path: str, json_path: str) -> None:
         if over.wait(max(0.0, start_s + number * PERIOD_S - time.monotonic())):
             break
         stamp_s = start_unix_s + number * PERIOD_S
-        ros.say(levers, position, stamp_s)
-        plain.say(levers, position, stamp_s)
+        for speaker in speakers:
+            speaker.say(levers, position, stamp_s)
         while not words.empty():
             word = words.get()
             if "lose" in word:
@@ -108,4 +109,4 @@ def main(endpoint: str, ros_path: str, json_path: str) -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:4])
+    main(*sys.argv[1:])

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import pytest
 import zenoh
 
 from rampe_guard.errors import SettingsError
 from rampe_guard.programs.access import MAX_MESSAGE_BYTES, router_config, write_router_config
-from rampe_guard.settings.access import AccessModel, check_access
+from rampe_guard.settings.access import check_access
+from rampe_guard.settings.access_model import AccessModel
 from rampe_guard.settings.source import parse
 from rampe_guard.wire import MAX_PAYLOAD_BYTES
 from rampe_guard.wire.channels import KEYS
 from tests.support.processes import ROOT, called
+from tests.support.rights import granted
 
 EXAMPLE = ROOT / "deploy" / "access.example.yaml"
 BASE = "rampe/quarry-north/excavator-7/guard"
@@ -33,18 +34,6 @@ access:
 
 def access(role: str = "viewer") -> AccessModel:
     return check_access(parse(TEXT.replace("ROLE", role), "access.yaml"))
-
-
-def granted(config: dict[str, Any], name: str, flow: str, message: str) -> set[str]:
-    """Keys on which the bearer of a certificate may send (or get) a message."""
-    control = config["access_control"]
-    wanted = {rule for p in control["policies"] if name in p["subjects"] for rule in p["rules"]}
-    return {
-        key
-        for rule in control["rules"]
-        if rule["id"] in wanted and flow in rule["flows"] and message in rule["messages"]
-        for key in rule["key_exprs"]
-    }
 
 
 @pytest.mark.parametrize(
