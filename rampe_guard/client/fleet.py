@@ -4,7 +4,9 @@ Each function takes a `Fleet` and returns the next one with the items to tell, i
 ``now_s`` are on the listener's monotonic clock, so no wall clock has to agree with another.
 
 **Silence.** A heartbeat older than `Fleet.expires_after_s`, an active alert not repeated within
-its own ``expires_after_s``, or a liveliness token that went, is protection `UNAVAILABLE`.
+its own ``expires_after_s``, or a liveliness token that went, is protection `UNAVAILABLE`. Ages
+count from when a message was sent, not from when it came; and who is heard again must have told
+all alerts first (`contact`).
 
 **Loss.** ``seq`` counts the messages on a key, so a gap is told. Nothing becomes clear because
 something did not come: an alert ends by the guard's explicit clear, by a newer alert of the same
@@ -23,6 +25,7 @@ from types import MappingProxyType
 from typing import TypeAlias
 
 from rampe_guard import wire
+from rampe_guard.client.contact import beaten, sent_s
 from rampe_guard.client.items import (
     Alert,
     GuardRestarted,
@@ -66,7 +69,7 @@ def at(fleet: Fleet, now_s: float) -> Told:
     machines: dict[str, MachineState] = {}
     items: list[Item] = []
     for base, before in fleet.machines.items():
-        late = any(now_s - a.received_s > a.expires_after_s / 2.0 for a in before.alerts)
+        late = any(now_s - a.sent_s > a.expires_after_s / 2.0 for a in before.alerts)
         machine = replace(before, now_s=now_s, behind=before.behind or late)
         machines[base], told = _tell(machine)
         items += told
@@ -98,7 +101,8 @@ def on_alert(fleet: Fleet, base: str, message: wire.Alert, now_s: float) -> Told
         return fleet, ()
     if any(isinstance(item, MessagesLost) for item in items):
         machine = replace(machine, behind=True)
-    machine, told = _take(machine, alert_from(message, base, now_s))
+    machine, alert = _dated(machine, message, now_s)
+    machine, told = _take(machine, alert)
     return _put(fleet, machine, items + told)
 
 
@@ -115,11 +119,14 @@ def on_state(fleet: Fleet, base: str, message: wire.State, now_s: float, asked_s
         return fleet, ()
     machine, items = met
     machine = _beat(machine, message.heartbeat, now_s)
+    if not machine.silent:
+        machine = replace(machine, contact=replace(machine.contact, since_s=None))
     for found in message.alerts:
         known = _known(machine, found.alert_id)
         if found.alert_id in machine.memory.ended or (known is not None and known.seq > found.seq):
             continue
-        machine, told = _take(machine, alert_from(found, base, now_s))
+        machine, alert = _dated(machine, found, now_s)
+        machine, told = _take(machine, alert)
         items += told
     held = {alert.alert_id for alert in message.alerts}
     missing = [alert for alert in machine.alerts if alert.alert_id not in held]
@@ -222,11 +229,24 @@ def _meet(
     return replace(named, memory=memory, behind=True), [restarted]
 
 
+def _dated(machine: MachineState, message: wire.Alert, now_s: float) -> tuple[MachineState, Alert]:
+    contact, sent = sent_s(machine.contact, message, now_s)
+    return replace(machine, contact=contact), alert_from(message, machine.base, now_s, sent)
+
+
 def _beat(machine: MachineState, message: wire.Heartbeat, now_s: float) -> MachineState:
+    contact, beat_s = sent_s(machine.contact, message, now_s)
+    lost = machine.silent and now_s - beat_s <= machine.expires_after_s
     known = machine.heartbeat
     if known is not None and known.boot_id == message.boot_id and known.seq > message.seq:
         message = known
-    return replace(machine, heartbeat=message, heartbeat_s=now_s, gone=False)
+    return replace(
+        machine,
+        heartbeat=message,
+        contact=beaten(contact, beat_s, now_s, lost=lost),
+        gone=False,
+        behind=machine.behind or lost,
+    )
 
 
 def _take(machine: MachineState, alert: Alert) -> tuple[MachineState, list[Item]]:
@@ -274,13 +294,17 @@ def _gravest_first(alert: Alert) -> tuple[int, float, str]:
 def _tell(machine: MachineState) -> tuple[MachineState, tuple[Item, ...]]:
     """What is to be said of the protection, if it is not what was said last."""
     now = machine.protection
-    waiting = machine.heartbeat is None and (
-        machine.now_s - machine.first_s < machine.expires_after_s
-    )
+    if machine.heartbeat is None:
+        waiting = machine.now_s - machine.first_s < machine.expires_after_s
+    else:
+        # in a moment it is known what to tell; who was told that all is well is told at once
+        known = machine.silent or machine.told_all
+        told = machine.memory.told
+        waiting = now is Protection.UNAVAILABLE and not known and not (told and told.guarded)
     if now is machine.memory.told or waiting:
         return machine, ()
-    told = replace(machine, memory=replace(machine.memory, told=now))
-    return told, (_protection(machine, now),)
+    machine = replace(machine, memory=replace(machine.memory, told=now))
+    return machine, (_protection(machine, now),)
 
 
 def _protection(machine: MachineState, now: Protection) -> ProtectionLost | ProtectionBack:

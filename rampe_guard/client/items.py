@@ -46,11 +46,16 @@ class Alert(wire.Alert, frozen=True, kw_only=True, tag_field="event", tag="alert
     Attributes:
         base: prefix of the guard's keys.
         received_s: when it came, on `time.monotonic` of this process [s].
+        sent_s: when it was sent, at the latest, on the same clock [s]: its age counts from there.
         inferred: the guard's own clear was lost; its `state` says that the alert is over.
     """
 
     base: Base
     received_s: Annotated[float, Meta(description="When it came, on the listener's clock [s].")]
+    sent_s: Annotated[
+        float,
+        Meta(description="When it was sent, at the latest, on the listener's clock [s]."),
+    ]
     inferred: Annotated[
         bool, Meta(description="The clear itself was lost; the guard's state says it is over.")
     ] = False
@@ -122,9 +127,12 @@ class MessagesLost(Struct, frozen=True, kw_only=True, tag_field="event", tag="me
 Item: TypeAlias = Alert | ProtectionLost | ProtectionBack | GuardRestarted | MessagesLost
 
 
-def alert_from(message: wire.Alert, base: str, received_s: float) -> Alert:
-    """A message of the contract with where and when [s] it came."""
-    return Alert(base=base, received_s=received_s, **_fields(message))
+def alert_from(
+    message: wire.Alert, base: str, received_s: float, sent_s: float | None = None
+) -> Alert:
+    """A message of the contract with where it came from and when [s]; sent as it came, if None."""
+    sent_s = received_s if sent_s is None else sent_s
+    return Alert(base=base, received_s=received_s, sent_s=sent_s, **_fields(message))
 
 
 def ended(alert: Alert, received_s: float) -> Alert:
@@ -140,6 +148,7 @@ def ended(alert: Alert, received_s: float) -> Alert:
         similar_contacts=None,
         time_to_collision_s=None,
         received_s=received_s,
+        sent_s=received_s,
         inferred=True,
         text=text,
     )

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from rampe_guard import wire
+from rampe_guard.client.contact import Contact
 from rampe_guard.client.items import Alert, Protection
 
 STATUS = {"ok": Protection.MONITORING, "degraded": Protection.DEGRADED}
@@ -42,7 +43,7 @@ class MachineState:
         machine: its name; empty until heard.
         boot_id: of the run of the guard that speaks; None until heard.
         heartbeat: the newest; None until heard.
-        heartbeat_s: when the newest came [s].
+        contact: how fresh it is, and whether all alerts are known.
         gone: the guard's liveliness token went, and no heartbeat came since.
         alerts: every alert that is not over, shelved and expired ones too; the gravest first.
         unreadable_s: when an alert came that could not be read [s]; None: never.
@@ -59,7 +60,7 @@ class MachineState:
     machine: str = ""
     boot_id: str | None = None
     heartbeat: wire.Heartbeat | None = None
-    heartbeat_s: float | None = None
+    contact: Contact = field(default_factory=Contact)
     gone: bool = False
     alerts: tuple[Alert, ...] = ()
     unreadable_s: float | None = None
@@ -69,8 +70,9 @@ class MachineState:
 
     @property
     def silence_s(self) -> float | None:
-        """Time since the newest heartbeat [s]; None if there never was one."""
-        return None if self.heartbeat_s is None else self.now_s - self.heartbeat_s
+        """Time since the newest heartbeat was sent [s], at least; None if there never was one."""
+        beat_s = self.contact.beat_s
+        return None if beat_s is None else self.now_s - beat_s
 
     @property
     def protection(self) -> Protection:
@@ -81,7 +83,7 @@ class MachineState:
         if status is None:
             off = [reason.code for reason in self.heartbeat.reasons] == ["machine_off"]
             return Protection.MACHINE_OFF if off else Protection.NOT_MONITORING
-        if self._blind or any(self.expired(alert) for alert in self.alerts):
+        if not self.told_all or self._blind or any(self.expired(alert) for alert in self.alerts):
             return Protection.UNAVAILABLE
         return status
 
@@ -95,11 +97,18 @@ class MachineState:
         if self.silent:
             return (f"no heartbeat for {self.silence_s:.1f} s",)
         if self.protection is Protection.UNAVAILABLE:
-            if self._blind:
-                return ("an alert cannot be read: another version of rampe-guard?",)
-            expired = [a.zone or "system" for a in self.alerts if self.expired(a)]
-            return tuple(f"the alert of {zone} is not repeated" for zone in expired)
+            return self._missing
         return tuple(reason.text for reason in self.heartbeat.reasons)
+
+    @property
+    def _missing(self) -> tuple[str, ...]:
+        """What is missing of a guard that says that it watches."""
+        if not self.told_all:
+            return ("the guard is heard again, its alerts are being asked for",)
+        if self._blind:
+            return ("an alert cannot be read: another version of rampe-guard?",)
+        expired = [alert.zone or "system" for alert in self.alerts if self.expired(alert)]
+        return tuple(f"the alert of {zone} is not repeated" for zone in expired)
 
     @property
     def active(self) -> tuple[Alert, ...]:
@@ -113,7 +122,12 @@ class MachineState:
 
     def expired(self, alert: Alert) -> bool:
         """It was not repeated in time: still shown, no longer to be trusted."""
-        return self.now_s - alert.received_s > alert.expires_after_s
+        return self.now_s - alert.sent_s > alert.expires_after_s
+
+    @property
+    def told_all(self) -> bool:
+        """No alert can stand that has not been told."""
+        return self.contact.complete(self.now_s)
 
     @property
     def _blind(self) -> bool:
@@ -125,5 +139,4 @@ class MachineState:
     @property
     def silent(self) -> bool:
         """Its guard is gone, was never heard, or not lately."""
-        silence_s = self.silence_s
-        return self.gone or silence_s is None or silence_s > self.expires_after_s
+        return self.gone or self.contact.silent(self.now_s, self.expires_after_s)

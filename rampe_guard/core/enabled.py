@@ -67,8 +67,8 @@ class EnableKey:
         verdict = self._gate.check(sample)
         if isinstance(verdict, Accepted):
             if verdict.restarted:
-                self._own.restart()
-            self._own.follow(sample.stamp_s, sample.arrival_s, stamped=sample.stamped)
+                self._own = SenderClock()
+            self._own = self._own.followed(sample.stamp_s, sample.arrival_s, stamped=sample.stamped)
         if sample.enabled:
             verdict = Accepted(sample)
         if isinstance(verdict, Fault):
@@ -87,9 +87,9 @@ class EnableKey:
     def moved(self, sample: ActuatorSample, *, restarted: bool) -> None:
         """Take an accepted position of the machine."""
         if restarted:
-            self._clock.restart()
+            self._clock = SenderClock()
             self._anchor = None
-        self._clock.follow(sample.stamp_s, sample.arrival_s, stamped=sample.stamped)
+        self._clock = self._clock.followed(sample.stamp_s, sample.arrival_s, stamped=sample.stamped)
         now_s, q = sample.arrival_s, sample.position
         if self._anchor is None:
             self._anchor = (now_s, q)

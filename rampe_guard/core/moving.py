@@ -74,12 +74,12 @@ class MovingObject:
         if self._newest is not None and not verdict.restarted:
             self._check_speed(self._newest, sample)
         if verdict.restarted:
-            self._own.restart()
+            self._own = SenderClock()
         self._newest = sample
         self._measured_s, self._early_s = sample.arrival_s, None
         if sample.stamped:
             self._measured_s = clock.measured_s(sample.stamp_s, sample.arrival_s)
-            self._own.follow(sample.stamp_s, sample.arrival_s)
+            self._own = self._own.followed(sample.stamp_s, sample.arrival_s)
             self._early_s = clock.early_s(self._own)
         self._accepted += 1
         if self._anchor is None or self._left(self._anchor, sample.pose):
@@ -194,8 +194,8 @@ class MovingObjects:
     def follow(self, sample: ActuatorSample, *, restarted: bool) -> None:
         """Take an accepted position of the machine: its stamp tells how the clocks differ."""
         if restarted:
-            self._clock.restart()
-        self._clock.follow(sample.stamp_s, sample.arrival_s, stamped=sample.stamped)
+            self._clock = SenderClock()
+        self._clock = self._clock.followed(sample.stamp_s, sample.arrival_s, stamped=sample.stamped)
 
     def take(self, inputs: Inputs, now_s: float) -> tuple[bool, list[RefusalEvent]]:
         """Take what arrived, in order; whether a pose is new, and what was refused.

@@ -9,6 +9,8 @@ one: how long any message of it was under way, nobody can tell.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 _DRIFT = 1e-3
 """How much the distance may shrink by [s/s]: clocks run apart by far less, and one position
 that came without delay is not held against the later ones for ever."""
@@ -17,40 +19,41 @@ _SPREAD_S = 0.3
 differ by more are not to be told from clocks that differ [s]."""
 
 
+@dataclass(frozen=True, slots=True)
 class SenderClock:
-    """How far a sender's clock is ahead of ours, as its freshest message shows it."""
+    """How far a sender's clock is ahead of ours, as its freshest message shows it.
 
-    def __init__(self) -> None:
-        self._ahead_s: float | None = None
-        self._at_s = 0.0
+    Attributes:
+        ahead_s: by so much [s]; None before the first message.
+        at_s: arrival of the newest message [s].
+    """
 
-    def follow(self, stamp_s: float, arrival_s: float, *, stamped: bool = True) -> None:
-        """Take an accepted message; without a stamp of its own it tells nothing."""
+    ahead_s: float | None = None
+    at_s: float = 0.0
+
+    def followed(self, stamp_s: float, arrival_s: float, *, stamped: bool = True) -> SenderClock:
+        """The same after an accepted message; without a stamp of its own that tells nothing."""
         if not stamped:
-            return
+            return self
         ahead_s = stamp_s - arrival_s
-        if self._ahead_s is not None:
-            ahead_s = max(ahead_s, self._ahead_s - _DRIFT * (arrival_s - self._at_s))
-        self._ahead_s, self._at_s = ahead_s, arrival_s
-
-    def restart(self) -> None:
-        """The clock was set anew."""
-        self._ahead_s = None
+        if self.ahead_s is not None:
+            ahead_s = max(ahead_s, self.ahead_s - _DRIFT * (arrival_s - self.at_s))
+        return SenderClock(ahead_s, arrival_s)
 
     def measured_s(self, stamp_s: float, arrival_s: float) -> float:
         """Time of a measurement on our clock [s], never after its arrival."""
-        if self._ahead_s is None:
+        if self.ahead_s is None:
             return arrival_s
-        return min(arrival_s, stamp_s - self._ahead_s)
+        return min(arrival_s, stamp_s - self.ahead_s)
 
     def early_s(self, other: SenderClock) -> float | None:
         """How far another sender's clock is ahead [s], if further than one and the same can be.
 
         A message that was delayed does not hide it: the freshest one counts.
         """
-        if self._ahead_s is None or other._ahead_s is None:
+        if self.ahead_s is None or other.ahead_s is None:
             return None
-        early_s = other._ahead_s - self._ahead_s
+        early_s = other.ahead_s - self.ahead_s
         # while the machine is silent its clock runs on, and may run away from ours
-        allowed_s = _SPREAD_S + _DRIFT * max(other._at_s - self._at_s, 0.0)
+        allowed_s = _SPREAD_S + _DRIFT * max(other.at_s - self.at_s, 0.0)
         return early_s if early_s > allowed_s else None

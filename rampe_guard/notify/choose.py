@@ -87,5 +87,6 @@ def notices_of(machine: MachineState, at_least: Level) -> Iterable[Notice]:
 
 def _notice(item: Alert | ProtectionLost | ProtectionBack, subject: str, *, over: bool) -> Notice:
     body: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(item))
-    body.pop("received_s", None)  # on a clock that nobody else has
+    for name in ("received_s", "sent_s"):  # on a clock that nobody else has
+        body.pop(name, None)
     return Notice(item.base, subject, Level[item.level.upper()], over, {**body, "over": over})

@@ -35,11 +35,13 @@ class Scribe:
         site: whose guard it is.
         boot_id: of this run.
         unix_s: Unix time [s] of a time on the core's clock.
+        start_s: when the guard booted, on that clock [s]; None offline.
     """
 
     site: Site
     boot_id: str
     unix_s: Callable[[float], float]
+    start_s: float | None = None
 
     def alert(self, event: AlertEvent, compute_ms: float | None = None) -> wire.Alert:
         """An alert event as ``rampe.alert.v1``."""
@@ -73,6 +75,7 @@ class Scribe:
             similar_contacts=times[0] if times else None,
             stamp=event.stamp_s,
             published_unix_s=self.unix_s(event.now_s),
+            uptime_s=None if self.start_s is None else event.now_s - self.start_s,
             input_age_s=event.input_age_s,
             compute_ms=compute_ms,
             raised_unix_s=self.unix_s(event.raised_s),

@@ -96,7 +96,7 @@ class Worker:
         self._bus, self._say, self._minders = bus, say, minders
         boot = boot_id()
         start_s = time.monotonic()
-        self._scribe = Scribe(site, boot, _unix_s)
+        self._scribe = Scribe(site, boot, _unix_s, start_s)
         self._pulse = Pulse(site, boot, start_s, _unix_s, site.scene.content_hash)
         timed = TimedSweeper(machine.sweeper, self._pulse.sweep_ms)
         self._guard = machine.guard(start_s, boot, timed, advise=True)

@@ -53,7 +53,7 @@ def _cells(alert: AlertView, now_s: float, width: int) -> Iterable[Text]:
 
 def _remark(alert: AlertView, now_s: float, *, stale: bool) -> str:
     if stale:
-        return f"STALE {now_s - alert.received_s:.0f} s"
+        return f"STALE {now_s - alert.sent_s:.0f} s"
     if alert.inhibit == "machine_off":
         return "machine off"
     if alert.inhibit == "shelved":

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from rampe_guard.client.contact import beaten, sent_s
 from rampe_guard.client.items import Protection
 from rampe_guard.client.machine import STATUS
 from rampe_guard.core.alarm import Level
@@ -113,12 +114,14 @@ def on_prediction(state: ViewState, message: Prediction, now_s: float) -> ViewSt
 
 def on_heartbeat(state: ViewState, message: Heartbeat, now_s: float) -> ViewState:
     """Show health; a guard that restarted takes its old alerts with it."""
-    before = state.health
+    before, lost = state.health, state.silent
+    contact, beat_s = sent_s(state.contact, message, now_s)
+    regained = lost and now_s - beat_s <= state.expires_after_s
+    contact = beaten(contact, beat_s, now_s, lost=regained)
     health = HealthView(
         protection=_protection(message),
         reasons=tuple(reason.text for reason in message.reasons),
         boot_id=message.boot_id,
-        received_s=now_s,
         joystick_age_s=message.input_age_s.joystick_s,
         actuators_age_s=message.input_age_s.actuators_s,
         loop_p50_ms=message.loop_ms.p50 if message.loop_ms else None,
@@ -127,7 +130,7 @@ def on_heartbeat(state: ViewState, message: Heartbeat, now_s: float) -> ViewStat
         sweep_p99_ms=message.sweep_ms.p99 if message.sweep_ms else None,
         version=message.version,
     )
-    state = replace(state, now_s=now_s, health=health)
+    state = replace(state, now_s=now_s, health=health, contact=contact)
     if before is not None and before.boot_id != health.boot_id:
         kept = tuple(a for a in state.alerts if a.boot_id == health.boot_id)
         state = add_event(replace(state, alerts=kept), Level.WARNING, "the guard restarted")
@@ -136,11 +139,12 @@ def on_heartbeat(state: ViewState, message: Heartbeat, now_s: float) -> ViewStat
 
 def on_alert(state: ViewState, message: Alert, now_s: float) -> ViewState:
     """Show an alert, and tell of it when it rises, comes true or ends."""
-    state = replace(state, now_s=now_s)
+    contact, sent = sent_s(state.contact, message, now_s)
+    state = replace(state, now_s=now_s, contact=contact)
     zone = message.zone or "system"
     before = next((a for a in state.alerts if a.zone == zone), None)
     others = tuple(a for a in state.alerts if a.zone != zone)
-    alert = alert_view(message, now_s, before)
+    alert = alert_view(message, sent, before)
     if message.state == "normal":
         state = replace(state, alerts=others)
         if before is None or _told_by_heartbeat(before):
@@ -154,6 +158,8 @@ def on_alert(state: ViewState, message: Alert, now_s: float) -> ViewState:
 def on_state(state: ViewState, message: State, now_s: float) -> ViewState:
     """Catch up, for a viewer that comes late."""
     state = on_heartbeat(state, message.heartbeat, now_s)
+    if not state.silent:
+        state = _tell(replace(state, contact=replace(state.contact, since_s=None)))
     for alert in message.alerts:
         state = on_alert(state, alert, now_s)
     for prediction in message.predictions:
@@ -161,8 +167,14 @@ def on_state(state: ViewState, message: State, now_s: float) -> ViewState:
     return state
 
 
-def alert_view(message: Alert, now_s: float, before: AlertView | None = None) -> AlertView:
-    """An alert as a screen shows it; ``before`` is the same alert as it was, if it was."""
+def alert_view(message: Alert, sent: float, before: AlertView | None = None) -> AlertView:
+    """An alert as a screen shows it.
+
+    Args:
+        message: what the guard says.
+        sent: when it was sent, at the latest, on the viewer's clock [s].
+        before: the same alert as it was, if it was.
+    """
     level = Level[message.level.upper()]
     came_true = message.source == "contact" or (before is not None and before.came_true)
     warned_s = before.warned_unix_s if before is not None else None
@@ -185,7 +197,7 @@ def alert_view(message: Alert, now_s: float, before: AlertView | None = None) ->
         gone=message.state == "rtn_unacked",
         trusted=message.quality == "good",
         text=message.text,
-        received_s=now_s,
+        sent_s=sent,
         expires_after_s=message.expires_after_s,
         warned_unix_s=warned_s,
         came_true=came_true,
@@ -208,10 +220,13 @@ def _protection(message: Heartbeat) -> Protection:
 def _tell(state: ViewState) -> ViewState:
     """Tell the protection if it is another than was told last."""
     now, told = state.protection, state.told
-    waiting = state.health is None and state.began_s is not None
-    if waiting and state.now_s - (state.began_s or 0.0) <= state.expires_after_s:
-        return state
-    if now is told:
+    if state.health is None:
+        waits = state.began_s is not None and state.now_s - state.began_s <= state.expires_after_s
+    else:
+        known = state.silent or state.contact.complete(state.now_s)
+        # in a moment it is known what to tell; who was told that all is well is told at once
+        waits = now is Protection.UNAVAILABLE and not known and not (told and told.guarded)
+    if waits or now is told:
         return state
     state = replace(state, told=now)
     if now is Protection.MONITORING:

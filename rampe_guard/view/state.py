@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from rampe_guard.client.contact import Contact
 from rampe_guard.client.items import Protection
 from rampe_guard.core.alarm import Level
 
@@ -61,13 +62,13 @@ class AlertView:
         gone: its cause is gone; it only waits to be acknowledged.
         trusted: the guard says that its quality is good.
         text: the guard's own words.
-        received_s: when the message came [s].
+        sent_s: when the message was sent, at the latest [s].
         expires_after_s: age at which it must not be trusted [s].
         warned_unix_s: when it first warned, on the guard's clock [s]; None below warning.
         came_true: the arm went in.
         inhibit: why nobody is to be troubled: "none", "shelved" or "machine_off".
         shelved_by: who shelved it.
-        shelved_for_s: for how long from ``received_s`` on [s].
+        shelved_for_s: for how long from ``sent_s`` on [s].
         acked_by: who acknowledged it.
         times: how many of how many similar situations touched; None where memory is silent.
     """
@@ -85,7 +86,7 @@ class AlertView:
     gone: bool = False
     trusted: bool = True
     text: str = ""
-    received_s: float = 0.0
+    sent_s: float = 0.0
     expires_after_s: float = 1.0
     warned_unix_s: float | None = None
     came_true: bool = False
@@ -102,13 +103,13 @@ class AlertView:
 
     def stale(self, now_s: float) -> bool:
         """It was not repeated in time: still shown, no longer current."""
-        return now_s - self.received_s > self.expires_after_s
+        return now_s - self.sent_s > self.expires_after_s
 
     def shelved_left_s(self, now_s: float) -> float | None:
         """Until it will ask again [s]."""
         if self.shelved_for_s is None:
             return None
-        return max(0.0, self.received_s + self.shelved_for_s - now_s)
+        return max(0.0, self.sent_s + self.shelved_for_s - now_s)
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +120,6 @@ class HealthView:
         protection: what it says of monitoring.
         reasons: in words.
         boot_id: changes when the guard restarts.
-        received_s: when it came [s].
         joystick_age_s: of the newest joystick sample then [s].
         actuators_age_s: the same for the actuators [s].
         loop_p50_ms: loop time [ms].
@@ -132,7 +132,6 @@ class HealthView:
     protection: Protection
     reasons: tuple[str, ...]
     boot_id: str
-    received_s: float
     joystick_age_s: float | None = None
     actuators_age_s: float | None = None
     loop_p50_ms: float | None = None
@@ -174,6 +173,7 @@ class ViewState:
         expires_after_s: age at which heartbeat, position and command are stale [s].
         began_s: when the watch began [s]; None = long ago.
         told: the protection that was last told among the events.
+        contact: how fresh the heartbeat is, and whether all alerts are known.
     """
 
     machine: str
@@ -190,16 +190,25 @@ class ViewState:
     expires_after_s: float = 1.0
     began_s: float | None = None
     told: Protection | None = None
+    contact: Contact = field(default_factory=Contact)
 
     @property
     def silence_s(self) -> float | None:
-        """Time since the last heartbeat [s]; None if there never was one."""
-        return None if self.health is None else self.now_s - self.health.received_s
+        """Time since the last heartbeat was sent [s], at least; None if there never was one."""
+        beat_s = self.contact.beat_s
+        return None if beat_s is None else self.now_s - beat_s
+
+    @property
+    def silent(self) -> bool:
+        """No heartbeat, or too old a one."""
+        return self.contact.silent(self.now_s, self.expires_after_s)
 
     @property
     def protection(self) -> Protection:
         """What can be relied on now: a heartbeat that is too old protects nobody."""
-        if self.health is None or self.silence_s is None or self.silence_s > self.expires_after_s:
+        if self.health is None or self.silent:
+            return Protection.UNAVAILABLE
+        if self.health.protection.guarded and not self.contact.complete(self.now_s):
             return Protection.UNAVAILABLE
         return self.health.protection
 
@@ -211,6 +220,8 @@ class ViewState:
             return reasons or "the guard gave no reason"
         if self.silence_s is None:
             return "no message from the guard yet"
+        if not self.silent:
+            return "the guard is heard again, its alerts are not all known yet"
         return f"no message from the guard for {self.silence_s:.1f} s"
 
     @property

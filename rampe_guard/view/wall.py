@@ -127,7 +127,7 @@ class Wall:
             Row(
                 *self.name(machine.base, machine.machine, machine.site),
                 machine,
-                tuple(alert_view(alert, alert.received_s) for alert in machine.alerts),
+                tuple(alert_view(alert, alert.sent_s) for alert in machine.alerts),
             )
             for machine in machines
         ]

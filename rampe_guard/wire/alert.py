@@ -91,6 +91,13 @@ class Alert(Message, frozen=True, kw_only=True):
     ] = None
     stamp: f.Stamp
     published_unix_s: f.Published
+    uptime_s: Annotated[
+        float | None,
+        Meta(
+            description="Time since the boot at publication [s], as in the heartbeat: shows who"
+            " compares it with its arrival that it came late; null offline."
+        ),
+    ] = None
     input_age_s: Annotated[
         float | None, Meta(description="Age of the newest input at publication [s].")
     ]

@@ -1,8 +1,9 @@
 """What a consumer of the alerts would show, at every moment: the judge of the fault tests.
 
 It trusts exactly what the contract says may be trusted: an alert for as long as it expires after,
-a guard for as long as its heartbeat is younger than a second and says that it monitors. It keeps
-no messages, so it can listen for days.
+a guard for as long as its heartbeat is younger than a second and says that it monitors. Both count
+from when they were sent, as the promptest message of the guard shows; and a guard that was lost
+must be heard for half a second, or tell its state. It keeps no messages, so it can listen for days.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from tests.support.ears import open_session
 
 TRUST_S = 1.0
 """Age of a heartbeat at which nothing is to be trusted any more."""
+KNOWN_S = 0.5
+"""How long a guard that was lost is heard before every alert of it has been repeated."""
 LOST = "lost"
 
 
@@ -58,6 +61,8 @@ class Witness:
         self.unreadable = 0
         self.restarts: list[str] = []
         self._raised: dict[str, float] = {}
+        self._promptest_s = float("inf")
+        self._known_s = 0.0
         self.session = open_session(endpoints)
         self._subscriber = self.session.declare_subscriber(f"{base}/*", self._hear)
 
@@ -71,6 +76,8 @@ class Witness:
             if any(now_s > active.until_s for active in self._active.values()):
                 return LOST
             found = self._active.get(zone)
+            if now_s < self._known_s:
+                return LOST
             return "clear" if found is None else found.level
 
     def status(self, since_s: float) -> str | None:
@@ -109,6 +116,7 @@ class Witness:
         with self._lock:
             if state["heartbeat"]["boot_id"] != self._boot:
                 return
+            self._known_s = at_s
             alive = {alert["zone"] for alert in state["alerts"]}
             for zone in self._active.keys() - alive:
                 del self._active[zone]
@@ -149,6 +157,10 @@ class Witness:
                 self._seq.clear()
                 self._raised.clear()
                 self.behind = True
+                self._promptest_s = float("inf")
+            # how much later it came than the promptest: for so long at least it was on its way
+            self._promptest_s = min(self._promptest_s, at_s - body["uptime_s"])
+            at_s = body["uptime_s"] + self._promptest_s
             if topic == "heartbeat":
                 self._beat(body, at_s)
             else:
@@ -156,6 +168,9 @@ class Witness:
 
     def _beat(self, body: dict[str, Any], at_s: float) -> None:
         beats = self.beats
+        now_s = time.monotonic()
+        if now_s - beats.at_s > TRUST_S >= now_s - at_s:
+            self._known_s, self.behind = now_s + KNOWN_S, True
         if beats.count:
             beats.longest_s = max(beats.longest_s, at_s - beats.at_s)
         beats.count += 1

@@ -32,21 +32,29 @@ class Listener:
         self.fleet = Fleet()
         self.items: list[Item] = []
         self.now_s = 100.0
+        self.booted_s = 40.0
+        self.unix_s = 1.7e9
+
+    def sent(self, late_s: float = 0.0) -> dict[str, float]:
+        """The guard's clocks in a message that was on its way for so long [s]."""
+        sent_s = self.now_s - late_s
+        return {"uptime_s": sent_s - self.booted_s, "published_unix_s": self.unix_s + sent_s}
 
     @property
     def machine(self) -> MachineState:
         return self.fleet.machines[BASE]
 
-    def beat(self, seq: int, **change: Any) -> None:
-        message = structs.replace(HEARTBEAT, seq=seq, **change)
+    def beat(self, seq: int, late_s: float = 0.0, **change: Any) -> None:
+        message = structs.replace(HEARTBEAT, seq=seq, **self.sent(late_s), **change)
         self._keep(core.on_heartbeat(self.fleet, BASE, message, self.now_s))
 
-    def alert(self, seq: int, **change: Any) -> None:
-        message = structs.replace(ALERT, seq=seq, **change)
+    def alert(self, seq: int, late_s: float = 0.0, **change: Any) -> None:
+        message = structs.replace(ALERT, seq=seq, **{**self.sent(late_s), **change})
         self._keep(core.on_alert(self.fleet, BASE, message, self.now_s))
 
     def state(self, *alerts: wire.Alert, asked_s: float | None = None, **change: Any) -> None:
-        heartbeat = structs.replace(HEARTBEAT, **change)
+        heartbeat = structs.replace(HEARTBEAT, **self.sent(), **change)
+        alerts = tuple(structs.replace(alert, **self.sent()) for alert in alerts)
         message = structs.replace(STATE, heartbeat=heartbeat, alerts=alerts)
         asked_s = self.now_s if asked_s is None else asked_s
         self._keep(core.on_state(self.fleet, BASE, message, self.now_s, asked_s))
@@ -93,6 +101,9 @@ def test_a_machine_that_is_expected_and_never_heard_is_unavailable() -> None:
     assert lost.text == "PROTECTION UNAVAILABLE: no guard was heard"
     assert ear.machine.protection is Protection.UNAVAILABLE
     ear.beat(7)
+    assert ear.machine.behind  # ask for its state: alerts may stand that were never told
+    assert ear.told() == []
+    ear.state()
     assert kinds(ear.told()) == ["ProtectionBack"]
     ear._keep(core.expect(ear.fleet, BASE, ear.now_s))
     assert ear.told() == []
@@ -141,7 +152,65 @@ def test_a_silent_guard_is_told_once_and_so_is_its_return(ear: Listener) -> None
     ear.wait(5.0)
     assert ear.told() == []
     ear.beat(9)
+    assert ear.told() == []
+    assert ear.machine.reasons == ("the guard is heard again, its alerts are being asked for",)
+    ear.state()
     assert kinds(ear.told()) == ["ProtectionBack"]
+
+
+def test_a_guard_that_tells_no_state_has_told_all_alerts_after_half_a_second(
+    ear: Listener,
+) -> None:
+    ear.wait(2.0)
+    ear.told()
+    for seq in range(2, 5):
+        ear.beat(seq)
+        assert ear.machine.protection is Protection.UNAVAILABLE
+        ear.wait(0.2)
+    assert kinds(ear.told()) == ["ProtectionBack"]
+
+
+def test_what_a_network_kept_and_hands_on_protects_nobody(ear: Listener) -> None:
+    """A router stood still for ten seconds: then all that it kept comes at once."""
+    ear.wait(10.0)
+    ear.told()
+    for seq in range(2, 50):
+        ear.beat(seq, late_s=10.0 - 0.18 * seq)
+        assert ear.machine.protection is Protection.UNAVAILABLE
+    assert ear.told() == []
+    ear.beat(50)
+    ear.state()
+    assert kinds(ear.told()) == ["ProtectionBack"]
+
+
+def test_an_alert_that_was_kept_on_its_way_is_not_trusted(ear: Listener) -> None:
+    ear.alert(1, late_s=1.5)
+    assert ear.machine.alerts[0].received_s - ear.machine.alerts[0].sent_s == pytest.approx(1.5)
+    assert ear.machine.reasons == ("the alert of wall is not repeated",)
+    ear.alert(2)
+    assert ear.machine.protection is Protection.MONITORING
+
+
+@pytest.mark.parametrize("change", ["clock set", "computer slept"])
+def test_one_clock_that_jumps_makes_no_message_late(ear: Listener, change: str) -> None:
+    if change == "clock set":
+        ear.unix_s -= 3600.0
+    else:
+        ear.booted_s += 600.0
+    ear.wait(0.2)
+    ear.beat(2)
+    assert ear.machine.silence_s == 0.0
+    assert ear.told() == []
+
+
+def test_clocks_that_drift_apart_make_no_message_late(ear: Listener) -> None:
+    for seq in range(2, 36_000):  # two hours, half a millisecond lost a second
+        ear.wait(0.2)
+        ear.booted_s += 1e-4
+        ear.unix_s -= 1e-4
+        ear.beat(seq)
+    assert ear.machine.silence_s == pytest.approx(0.0, abs=1e-3)
+    assert ear.told() == []
 
 
 def test_a_token_that_went_is_told_at_once_until_a_heartbeat_comes(ear: Listener) -> None:
@@ -149,6 +218,7 @@ def test_a_token_that_went_is_told_at_once_until_a_heartbeat_comes(ear: Listener
     (lost,) = ear.told()
     assert lost.text == "PROTECTION UNAVAILABLE: the guard, or the network to it, is gone"
     ear.beat(2)
+    ear.state()
     assert kinds(ear.told()) == ["ProtectionBack"]
 
 
@@ -165,19 +235,17 @@ def test_a_token_alone_protects_nobody() -> None:
 
 def test_an_alert_is_told_when_it_changes_and_not_when_it_is_repeated(ear: Listener) -> None:
     published = 1e9
-    for seq, change in enumerate(
-        [
-            {},
-            {},
-            {"level": "imminent", "previous_level": "warning"},
-            {"level": "imminent", "state": "acked", "acked_by": "me"},
-            {"level": "imminent", "state": "acked", "quality": "stale"},
-            {"level": "clear", "state": "rtn_unacked"},
-            {"level": "clear", "state": "rtn_unacked"},
-            {"level": "clear", "state": "normal"},
-        ],
-        start=1,
-    ):
+    changes: list[dict[str, Any]] = [
+        {},
+        {},
+        {"level": "imminent", "previous_level": "warning"},
+        {"level": "imminent", "state": "acked", "acked_by": "me"},
+        {"level": "imminent", "state": "acked", "quality": "stale"},
+        {"level": "clear", "state": "rtn_unacked"},
+        {"level": "clear", "state": "rtn_unacked"},
+        {"level": "clear", "state": "normal"},
+    ]
+    for seq, change in enumerate(changes, start=1):
         published += 0.2
         ear.alert(seq, published_unix_s=published, **change)
     assert levels(ear.told()) == [
@@ -359,7 +427,9 @@ def test_late_words_of_an_earlier_run_are_ignored_while_the_new_one_speaks(ear: 
     assert ear.machine.alerts == ()
     ear.wait(3.0)
     ear.beat(51)  # two guards on one key, and the newer one died
-    assert kinds(ear.told()) == ["ProtectionLost", "GuardRestarted", "ProtectionBack"]
+    assert kinds(ear.told()) == ["ProtectionLost", "GuardRestarted"]
+    ear.state(boot_id=ear.machine.boot_id)
+    assert kinds(ear.told()) == ["ProtectionBack"]
 
 
 def test_machines_are_bounded() -> None:

@@ -10,6 +10,7 @@ from msgspec import structs
 
 from rampe_guard import wire
 from rampe_guard.client import fleet as fleets
+from rampe_guard.client.contact import Contact
 from rampe_guard.client.fleet import Fleet
 from rampe_guard.client.machine import MachineState
 from rampe_guard.core.scene import Box
@@ -21,7 +22,7 @@ from rampe_guard.dashboard.picture import Picture
 from rampe_guard.dashboard.sight import Sight
 from rampe_guard.dashboard.tones import Tone
 from rampe_guard.settings import load_site
-from tests.support.messages import ALERT, HEARTBEAT, SILENT_JOYSTICK, SWINGING
+from tests.support.messages import ALERT, HEARTBEAT, SILENT_JOYSTICK, STATE, SWINGING
 from tests.support.processes import BENCH
 
 POSITION = np.array([1.0, 0.065, 0.08, 0.03])
@@ -48,7 +49,8 @@ def guard(
     """A guard that said all this just now."""
     fleet, _ = fleets.expect(Fleet(), BASE, now_s)
     if beat is not None:
-        fleet, _ = fleets.on_heartbeat(fleet, BASE, beat, now_s)
+        state = structs.replace(STATE, heartbeat=beat, alerts=())
+        fleet, _ = fleets.on_state(fleet, BASE, state, now_s, now_s)
     for number, alert in enumerate(alerts):
         fleet, _ = fleets.on_alert(fleet, BASE, structs.replace(alert, seq=number + 1), now_s)
     return fleet.machines[BASE]
@@ -235,7 +237,7 @@ def test_the_stopping_path_is_the_guards_own(model: Model) -> None:
 
 
 def test_an_old_position_is_stale_and_has_no_future(model: Model) -> None:
-    state = replace(guard(), heartbeat_s=102.0, now_s=102.0)
+    state = replace(guard(), contact=Contact(beat_s=102.0), now_s=102.0)
     old = replace(sight(state, 102.0), prediction=SWINGING, velocity=np.full(4, 0.3))
     picture = compose(model, old)
     assert picture.stale

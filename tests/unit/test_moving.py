@@ -207,10 +207,8 @@ def test_a_clock_that_was_set_right_is_believed_again() -> None:
 
 def test_a_machine_that_fell_silent_is_no_exact_clock() -> None:
     def early_s(stamp_s: float, arrival_s: float) -> float | None:
-        clock, other = SenderClock(), SenderClock()
-        clock.follow(AHEAD_S + 10.0, 10.0)
-        other.follow(AHEAD_S + stamp_s, arrival_s)
-        return clock.early_s(other)
+        clock = SenderClock().followed(AHEAD_S + 10.0, 10.0)
+        return clock.early_s(SenderClock().followed(AHEAD_S + stamp_s, arrival_s))
 
     assert early_s(10.31, 10.0) == pytest.approx(0.31)
     assert early_s(1010.31, 1010.0) is None  # 0.3 s after 17 minutes
@@ -232,26 +230,24 @@ def test_a_machine_without_stamps_leaves_the_arrival_to_count() -> None:
 
 
 def test_one_late_position_does_not_make_old_poses_young() -> None:
-    clock = SenderClock()
-    clock.follow(AHEAD_S + 10.0, 10.0)
-    clock.follow(AHEAD_S + 10.1, 10.9)  # 0.8 s on the way
+    clock = SenderClock().followed(AHEAD_S + 10.0, 10.0)
+    clock = clock.followed(AHEAD_S + 10.1, 10.9)  # 0.8 s on the way
     assert clock.measured_s(AHEAD_S + 10.5, 11.0) == pytest.approx(10.5, abs=2e-3)
 
 
 def test_clocks_that_drift_apart_are_followed() -> None:
     clock = SenderClock()
     for k in range(200_000):  # 33 minutes at 100 Hz, the sender losing 0.5 ms a second
-        clock.follow(AHEAD_S + 0.01 * k * (1.0 - 5e-4), 0.01 * k)
+        clock = clock.followed(AHEAD_S + 0.01 * k * (1.0 - 5e-4), 0.01 * k)
     assert clock.measured_s(AHEAD_S + 2000.0 * (1.0 - 5e-4), 2000.0) == pytest.approx(2000.0)
 
 
 def test_a_machine_that_started_anew_brings_its_own_clock() -> None:
-    clock = SenderClock()
-    clock.follow(AHEAD_S, 10.0)
-    clock.restart()
-    assert clock.measured_s(5.0, 11.0) == 11.0
-    clock.follow(5.0, 11.0)
-    assert clock.measured_s(4.5, 11.0) == 10.5
+    moving = objects()
+    moving.follow(arm(AHEAD_S, 9.8), restarted=False)
+    moving.follow(arm(5.0, 10.0), restarted=True)
+    take(moving, seen(0.0, 4.9, 10.0))  # measured at 9.9
+    assert placed(moving, 10.2).grown_m == pytest.approx(0.6)
 
 
 def test_what_is_faster_than_its_settings_say_is_taken_and_told() -> None:

@@ -9,6 +9,7 @@ import pytest
 from msgspec import structs
 
 from rampe_guard.client import Alert, Item, MachineState, MessagesLost, Protection
+from rampe_guard.client.contact import Contact
 from rampe_guard.client.items import ProtectionBack, ProtectionLost, alert_from
 from rampe_guard.core.alarm import Level
 from rampe_guard.notify.choose import Notice, notice_of, notices_of
@@ -89,7 +90,7 @@ def test_a_notice_is_the_message_and_what_it_means() -> None:
     body = notice().body
     assert (body["event"], body["over"], body["base"]) == ("alert", False, BASE)
     assert body["schema"] == "rampe.alert.v1"
-    assert "received_s" not in body
+    assert not {"received_s", "sent_s"} & body.keys()
 
 
 def test_the_same_twice_is_known() -> None:
@@ -102,7 +103,7 @@ def test_the_same_twice_is_known() -> None:
 
 def machine(*alerts: Alert, now_s: float = 10.1, **change: Any) -> MachineState:
     heartbeat = structs.replace(HEARTBEAT, **change)
-    made = MachineState(BASE, now_s, 0.0, 1.0, heartbeat=heartbeat, heartbeat_s=10.0)
+    made = MachineState(BASE, now_s, 0.0, 1.0, heartbeat=heartbeat, contact=Contact(beat_s=10.0))
     return replace(made, alerts=alerts)
 
 

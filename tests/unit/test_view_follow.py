@@ -15,6 +15,7 @@ from rampe_guard.view.state import ViewState
 from rampe_guard.wire import (
     ActuatorsMessage,
     Alert,
+    Heartbeat,
     InputAges,
     InputRates,
     JoystickMessage,
@@ -64,15 +65,27 @@ def fresh() -> ViewState:
     return follow.begin("excavator-7", "quarry-north", ACTUATORS, limits, 10.0)
 
 
+def at(now_s: float, message: Heartbeat = HEARTBEAT) -> Heartbeat:
+    """A heartbeat that a guard sends at a time of ours."""
+    return structs.replace(message, uptime_s=now_s, published_unix_s=1e9 + now_s - 10.0)
+
+
+def heard(now_s: float) -> ViewState:
+    """A guard that has told its state."""
+    message = structs.replace(messages.STATE, heartbeat=at(now_s), alerts=(), predictions=())
+    return follow.on_state(fresh(), message, now_s)
+
+
 def sent(alert: Alert) -> Alert:
     return decode(encode(alert), Alert)
 
 
 def alerts(*changes: dict[str, object]) -> ViewState:
-    state = follow.on_heartbeat(fresh(), HEARTBEAT, 10.0)
+    state = heard(10.0)
     for i, change in enumerate(changes):
-        message = sent(structs.replace(ALERT, **change))
-        state = follow.on_alert(state, message, 10.0 + 0.1 * i)
+        now_s = 10.0 + 0.1 * i
+        message = sent(structs.replace(ALERT, **{"uptime_s": now_s, **change}))
+        state = follow.on_alert(state, message, now_s)
     return state
 
 
@@ -124,7 +137,7 @@ def test_a_primitive_seen_too_seldom_has_a_direction_but_no_prediction() -> None
 
 
 def test_health_comes_from_the_heartbeat_and_its_changes_are_told() -> None:
-    state = follow.on_heartbeat(fresh(), HEARTBEAT, 10.0)
+    state = heard(10.0)
     assert state.protection is Protection.MONITORING
     assert state.health is not None
     assert (state.health.loop_p99_ms, state.health.sweep_p50_ms) == (4.2, None)
@@ -133,20 +146,38 @@ def test_health_comes_from_the_heartbeat_and_its_changes_are_told() -> None:
         status="not_monitoring",
         reasons=(Reason(code="joystick_stale", text="no joystick for 0.7 s"),),
     )
-    state = follow.on_heartbeat(state, lost, 10.2)
+    state = follow.on_heartbeat(state, at(10.2, lost), 10.2)
     assert state.protection is Protection.NOT_MONITORING
-    state = follow.on_heartbeat(state, HEARTBEAT, 10.4)
+    state = follow.on_heartbeat(state, at(10.4), 10.4)
     assert texts(state) == ["monitoring again", "NOT MONITORING: no joystick for 0.7 s"]
 
 
 def test_a_guard_that_falls_silent_is_told_once_and_so_is_its_return() -> None:
-    state = follow.on_heartbeat(fresh(), HEARTBEAT, 10.0)
+    state = heard(10.0)
     for tenths in range(1, 30):
         state = follow.at(state, 10.0 + tenths / 10)
     assert texts(state) == ["PROTECTION UNAVAILABLE: no message from the guard for 1.1 s"]
     assert state.events[0].lost
-    state = follow.on_heartbeat(state, HEARTBEAT, 13.0)
-    assert texts(state)[0] == "monitoring again"
+    state = follow.on_heartbeat(state, at(13.0), 13.0)
+    assert len(texts(state)) == 1  # alerts may stand that were never told
+    assert state.protection is Protection.UNAVAILABLE
+    state = follow.on_heartbeat(follow.at(state, 13.3), at(13.3), 13.3)
+    assert texts(follow.at(state, 13.6))[0] == "monitoring again"
+
+
+def test_a_heartbeat_that_was_kept_on_its_way_is_as_old_as_it_is() -> None:
+    state = follow.at(heard(10.0), 20.0)
+    for late in (11.0, 15.0, 18.9):
+        state = follow.on_heartbeat(state, at(late), 20.0)
+    assert state.protection is Protection.UNAVAILABLE
+    assert state.silence_s == pytest.approx(1.1, abs=0.02)
+    assert state.why.startswith("no message from the guard for 1.1 s")
+
+
+def test_an_alert_that_was_kept_on_its_way_is_stale() -> None:
+    old = structs.replace(ALERT, uptime_s=11.0, published_unix_s=1e9 + 1.0)
+    state = follow.on_alert(follow.at(heard(10.0), 20.0), sent(old), 20.0)
+    assert state.alerts[0].stale(20.0)
 
 
 def test_a_guard_that_is_never_heard_is_told_after_a_second() -> None:
@@ -167,9 +198,9 @@ def test_not_monitoring_is_told_once_though_alert_and_heartbeat_say_it() -> None
     assert [a.text for a in state.alerts] == ["NOT MONITORING: joystick"]
     lost = Reason(code="joystick_silent", text="joystick silent")
     beat = structs.replace(HEARTBEAT, status="not_monitoring", reasons=(lost,))
-    state = follow.on_heartbeat(state, beat, 10.2)
+    state = follow.on_heartbeat(state, at(10.2, beat), 10.2)
     state = follow.on_alert(state, sent(structs.replace(ALERT, **said)), 10.3)
-    state = follow.on_heartbeat(state, HEARTBEAT, 10.4)
+    state = follow.on_heartbeat(state, at(10.4), 10.4)
     over = structs.replace(ALERT, **said, level="clear", state="normal")
     state = follow.on_alert(state, sent(over), 10.4)
     assert texts(state) == ["monitoring again", "NOT MONITORING: joystick silent"]
@@ -229,7 +260,7 @@ def test_an_alert_rises_and_clears() -> None:
 def test_a_repeat_tells_nothing_new_but_keeps_the_alert_fresh() -> None:
     state = alerts({}, {}, {})
     assert len(state.events) == 1
-    assert state.alerts[0].received_s == pytest.approx(10.2)
+    assert state.alerts[0].sent_s == pytest.approx(10.2)
 
 
 def test_a_contact_tells_the_lead_of_its_warning_once() -> None:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 from rich.cells import cell_len
 
+from rampe_guard.client.contact import Contact
 from rampe_guard.client.items import Protection
 from rampe_guard.core.alarm import Level
 from rampe_guard.view.marks import HATCH
@@ -28,9 +29,9 @@ ACTUATORS = (
     ActuatorView("stick", "m", 0.0, 1.6, 1.31, -0.001, 0.0, 0, 0.0, 0.0, 1.31),
     ActuatorView("bucket", "m", 0.0, 1.1, 0.92, -0.3, -0.5, -1, -0.4, 0.1, 0.52),
 )
-HEALTH = HealthView(Protection.MONITORING, (), "b", NOW - 0.1, 0.012, 0.008, 1.1, 4.2, 0.8, 3.1)
+HEALTH = HealthView(Protection.MONITORING, (), "b", 0.012, 0.008, 1.1, 4.2, 0.8, 3.1)
 ALERTS = (
-    AlertView("1", "silo", Level.CAUTION, link="stick", time_to_collision_s=3.42, received_s=NOW),
+    AlertView("1", "silo", Level.CAUTION, link="stick", time_to_collision_s=3.42, sent_s=NOW),
     AlertView(
         "2",
         "power-line",
@@ -39,7 +40,7 @@ ALERTS = (
         link="bucket",
         time_to_collision_s=0.48,
         probability=1.0,
-        received_s=NOW,
+        sent_s=NOW,
     ),
     AlertView(
         "3",
@@ -48,12 +49,13 @@ ALERTS = (
         link="bucket",
         time_to_collision_s=1.49,
         probability=0.83,
-        received_s=NOW,
+        sent_s=NOW,
     ),
 )
 EVENTS = (EventView(NOW - 2.8, Level.IMMINENT, "wall: entered; warned 0.84 s ahead"),)
 STATE = ViewState(
-    "excavator-7", "quarry-north", NOW, ACTUATORS, 12, NOW, NOW, NOW, HEALTH, ALERTS, EVENTS
+    *("excavator-7", "quarry-north", NOW, ACTUATORS, 12, NOW, NOW, NOW, HEALTH, ALERTS, EVENTS),
+    contact=Contact(beat_s=NOW - 0.1),
 )
 CALM = replace(STATE, alerts=())
 
@@ -135,7 +137,11 @@ def test_nothing_is_ever_green() -> None:
             "joystick silent",
         ),
         (replace(CALM, now_s=NOW + 3.4), "PROTECTION UNAVAILABLE", "for 3.5 s"),
-        (replace(CALM, health=None), "PROTECTION UNAVAILABLE", "no message from the guard yet"),
+        (
+            replace(CALM, health=None, contact=Contact()),
+            "PROTECTION UNAVAILABLE",
+            "no message from the guard yet",
+        ),
     ],
 )
 def test_no_protection_is_unmissable_and_never_reads_as_no_alert(
@@ -157,7 +163,7 @@ def test_a_heartbeat_just_within_its_time_still_counts() -> None:
 
 
 def test_an_alert_not_repeated_stays_and_is_called_stale() -> None:
-    old = replace(ALERTS[1], received_s=NOW - 2.0)
+    old = replace(ALERTS[1], sent_s=NOW - 2.0)
     row = line_of(shown(render(replace(STATE, alerts=(old,)))), "power-line")
     assert "■ IMMINENT" in row
     assert "STALE 2 s" in row
@@ -197,7 +203,7 @@ def flashes(alert: AlertView, after_s: float) -> bool:
     """Its shape is there now, and is not ``after_s`` later."""
 
     def row(now_s: float) -> str:
-        state = replace(STATE, alerts=(replace(alert, received_s=now_s),), now_s=now_s)
+        state = replace(STATE, alerts=(replace(alert, sent_s=now_s),), now_s=now_s)
         return line_of(shown(render(state)), alert.zone)
 
     return row(NOW).split()[0] != row(NOW + after_s).split()[0]

@@ -21,11 +21,16 @@ from rampe_guard.view.marks import HATCH
 from rampe_guard.view.tell import json_line, words, worth_a_line
 from rampe_guard.view.wall import Wall, fitted
 from rampe_guard.view.wall_screen import render_wall
-from tests.support.messages import ALERT, HEARTBEAT, SILENT_JOYSTICK
+from tests.support.messages import ALERT, HEARTBEAT, SILENT_JOYSTICK, STATE
 from tests.support.rendered import line_of, shown
 
 NOW = 100.0
 LINES = Path(__file__).resolve().parents[2] / "config/contract/rampe.watch_line.v1.schema.json"
+
+
+def clocks(now_s: float) -> dict[str, float]:
+    """Of a guard whose messages take no time."""
+    return {"uptime_s": now_s, "published_unix_s": ALERT.published_unix_s + now_s - NOW}
 
 
 class Scene:
@@ -39,13 +44,17 @@ class Scene:
     def beat(self, machine: str, now_s: float = NOW, site: str = "north", **change: Any) -> None:
         base = f"rampe/{site}/{machine}/guard"
         seq = self._next(f"{base}/heartbeat")
+        change = {**clocks(now_s), **change}
         beat = structs.replace(HEARTBEAT, machine=machine, site=site, seq=seq, **change)
         self._took(core.on_heartbeat(self.fleet, base, beat, now_s))
+        if not self.fleet.machines[base].told_all:
+            state = structs.replace(STATE, heartbeat=beat, alerts=())
+            self._took(core.on_state(self.fleet, base, state, now_s, float("-inf")))
 
     def alert(self, machine: str, now_s: float = NOW, site: str = "north", **change: Any) -> None:
         base = f"rampe/{site}/{machine}/guard"
         seq = self._next(f"{base}/alert")
-        change = {"alert_id": change.get("zone", "wall"), **change}
+        change = {**clocks(now_s), "alert_id": change.get("zone", "wall"), **change}
         alert = structs.replace(ALERT, machine=machine, site=site, seq=seq, **change)
         self._took(core.on_alert(self.fleet, base, alert, now_s))
 
