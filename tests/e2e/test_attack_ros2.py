@@ -14,13 +14,14 @@ from typing import Any
 import pytest
 import zenoh
 
+from rampe_guard.recording import McapReading
 from rampe_guard.ros2.graph import Voice, driver_tokens
 from rampe_guard.settings import Site, load_site
 from rampe_guard.settings.ros2_keys import JOINT_STATE, JOY, NO_HASH, Ros2Settings
 from tests.support.ears import open_session
 from tests.support.fort import BASE, Fort, fort
 from tests.support.pki import HAVE_OPENSSL
-from tests.support.processes import Process, until
+from tests.support.processes import Process, called, until
 from tests.support.ros2 import RosEars, angles_of, joint_state, joy
 from tests.support.ros_fort import DRIVER, ros_plan
 from tests.support.station import REST
@@ -111,6 +112,18 @@ def test_a_machine_of_ros_2_works_through_it(yard: Yard) -> None:
     assert {"zones", "contacts", "alerts"} <= spaces
     assert {key for key, _ in yard.taken} == set(yard.inputs)
     yard.untouched()
+
+
+def test_commands_hear_topics_with_a_certificate_that_reads(yard: Yard, tmp_path: Path) -> None:
+    day = tmp_path / "day.mcap"
+    arguments: list[str | Path] = ["-m", "rampe_guard", "record", yard.place.site("recorder"), day]
+    with Process(tmp_path, "record", [*arguments, "--for", "1.5"]) as recorder:
+        assert recorder.popen.wait(60.0) == 0, recorder.err
+    reading = McapReading(str(day))
+    topics = {message.channel.topic for message in reading.messages()}
+    assert topics >= {*yard.inputs, f"{BASE}/heartbeat"}
+    shown = called("scene", "show", yard.place.site("viewer"))
+    assert shown.returncode == 0, shown.stderr
 
 
 def test_tools_see_the_guard_and_the_named_driver_and_nobody_else(yard: Yard) -> None:
