@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from rampe_guard import __version__, wire
-from rampe_guard.errors import LogError, MessageError, ModelFileError, SettingsError
+from rampe_guard.errors import LogError, MessageError, ModelFileError
 from rampe_guard.recording.bundle import Bundle, gather
 from rampe_guard.recording.channels import channels_of
 from rampe_guard.recording.recorded_site import absolute_words
@@ -64,10 +64,6 @@ def record(wishes: Wishes, stop: StopFlag) -> str:
     """
     say = Sayer("rampe_guard.record")
     site = for_operator(connect_to(load_site(wishes.site), wishes.connect), wishes.operator)
-    if site.format != "json":
-        raise SettingsError(
-            f"{site.path}: format: {site.format!r} is not supported by this version; use json"
-        )
     clock, channels = Clock(), channels_of(site)
     beginning = _Beginning(site, gather(site), clock, say)
     rotation = Rotation.of(wishes.rotate_mb, wishes.rotate_minutes)
