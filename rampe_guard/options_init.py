@@ -6,6 +6,8 @@ import argparse
 
 from rampe_guard.options import add_site, positive
 
+_MOST_DOMAIN = 232
+
 
 def add_init(parser: argparse.ArgumentParser) -> None:
     """A URDF, a look at the machine, and where the files go."""
@@ -14,7 +16,8 @@ def add_init(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--site", default="my-site", metavar="NAME", help="(default my-site)")
     parser.add_argument("--machine", default="", metavar="NAME", help="(default: of the URDF)")
     source = parser.add_argument_group("measure the machine from a recording, or live")
-    source.add_argument("--log", metavar="FILE", help="recording (MCAP), or a CSV log")
+    text = "recording (MCAP), ROS bag, or a CSV log"
+    source.add_argument("--log", metavar="FILE", help=text)
     source.add_argument(
         "--connect", action="append", default=[], metavar="ENDPOINT", help="listen on it, live"
     )
@@ -24,13 +27,32 @@ def add_init(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="accept that anyone on the network of --connect can read and forge messages",
     )
-    text = "key of the joystick; of a CSV log its columns, in the order of the axes"
-    source.add_argument("--joystick", metavar="KEY", help=f"{text}: NAME[:SCALE[:OFFSET]],…")
-    text = "key of the actuators; of a CSV log the columns of the positions"
-    source.add_argument("--actuators", metavar="KEY", help=f"{text}, written the same way")
+    text = "key of the joystick, or topic of ROS 2 (then default /joy); of a CSV log its columns,"
+    text += " in the order of the axes: NAME[:SCALE[:OFFSET]],…"
+    source.add_argument("--joystick", metavar="KEY", help=text)
+    text = "key of the actuators, or topic (default /joint_states); of a CSV log the columns of the"
+    source.add_argument(
+        "--actuators", metavar="KEY", help=f"{text} positions, written the same way"
+    )
     source.add_argument("--time", metavar="COLUMN", help="of a CSV log; COLUMN:SCALE makes it [s]")
     source.add_argument(
         "--seconds", type=positive, default=60.0, help="for how long to listen live (default 60)"
+    )
+    ros2 = parser.add_argument_group("messages of ROS 2, as the ros2 block of a site file says it")
+    text = "of the messages (default json; a ROS bag is ros2)"
+    ros2.add_argument("--format", choices=("json", "ros2"), help=text)
+    ros2.add_argument(
+        "--transport",
+        choices=("rmw_zenoh", "ros2dds"),
+        help="what lies between ROS 2 and Zenoh (default rmw_zenoh)",
+    )
+    text = "ROS_DOMAIN_ID, 0 to 232 (default 0)"
+    ros2.add_argument("--domain", type=domain, metavar="N", help=text)
+    ros2.add_argument(
+        "--no-type-hash",
+        action="store_false",
+        dest="type_hash",
+        help="keys of rmw_zenoh have no hash of the type: ROS 2 Humble",
     )
     arm = parser.add_argument_group("what messages do not say")
     arm.add_argument(
@@ -72,6 +94,13 @@ def add_check(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seconds", type=positive, default=5.0, help="for how long, with --live (default 5)"
     )
+
+
+def domain(text: str) -> int:
+    """A ROS_DOMAIN_ID."""
+    if not (text.isascii() and text.isdigit() and int(text) <= _MOST_DOMAIN):
+        raise argparse.ArgumentTypeError(f"{text!r} is none of 0 to {_MOST_DOMAIN}")
+    return int(text)
 
 
 def names(text: str) -> tuple[str, ...]:

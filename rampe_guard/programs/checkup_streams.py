@@ -45,6 +45,7 @@ class Stream:
         silence_s: since the newest message at the end [s]; None if there was none.
         timeout_s: silence that is a fault [s].
         needed: without it nothing is guarded.
+        strange: what else is published on its topic of ROS 2, in words.
     """
 
     name: str
@@ -55,6 +56,7 @@ class Stream:
     silence_s: float | None
     timeout_s: float
     needed: bool = True
+    strange: str = ""
 
     @property
     def latency_s(self) -> FloatArray:
@@ -66,7 +68,8 @@ class Stream:
         """Why it cannot be used, None if it can."""
         bad = self.refused.total()
         if self.silence_s is None:
-            return f"nothing came on {self.key}" + ("" if not bad else " that is put on that key")
+            why = f"; {self.strange}" if self.strange else " that is put on that key"
+            return f"nothing came on {self.key}" + ("" if not bad else why)
         if len(self.arrival_s) < _USABLE * (len(self.arrival_s) + bad):
             return f"{bad} of {bad + len(self.arrival_s)} messages on {self.key} are refused"
         if self.silence_s > self.timeout_s:
@@ -85,9 +88,7 @@ class Judge:
 
     def stream(self, name: str, timeout_s: float, one: Listening, end_s: float) -> Stream:
         """What one input was like."""
-        refused: Counter[str] = Counter()
-        if one.strangers:
-            refused["wildcard_key"] = one.strangers
+        refused = Counter(one.refused)
         good: list[tuple[float, float | None]] = []
         for at_s, payload in one.messages:
             batch = Batch(self._site, at_s, _into(refused), self._decoders)
@@ -105,6 +106,7 @@ class Judge:
             silence_s=end_s - one.messages[-1][0] if one.messages else None,
             timeout_s=timeout_s,
             needed=not silent,
+            strange=one.why,
         )
 
     def traces(self) -> Traces:

@@ -28,6 +28,7 @@ from rampe_guard.programs.initing_questions import (
     names_asked,
     source_asked,
 )
+from rampe_guard.programs.initing_ros2 import block_of, settled, speech
 from rampe_guard.programs.initing_source import (
     MEASURED,
     heard_by,
@@ -37,6 +38,7 @@ from rampe_guard.programs.initing_source import (
 )
 from rampe_guard.programs.initing_wishes import Wishes
 from rampe_guard.programs.measuring import Heard
+from rampe_guard.programs.measuring_ros2 import in_strokes
 from rampe_guard.programs.output import output_folder
 from rampe_guard.runtime.stopping import StopFlag
 
@@ -65,13 +67,14 @@ def init(wishes: Wishes, console: Console, stop: StopFlag, ask: Ask | None = Non
     wishes = replace(wishes, machine=wishes.machine or str(read_urdf(urdf).name) or "machine")
     if ask is not None:
         wishes = source_asked(wishes, ask)
+    wishes = settled(wishes)
     heard = heard_by(wishes, [joint.name for joint in joints], console, stop)
     measured = () if heard is None else identify(heard.traces)
     if heard is not None:
         tell_heard(heard, measured, console)
     count = len(wishes.joints or joints) if heard is None else heard.traces.position.shape[1]
-    spoken = None if heard is None else heard.traces.names
-    hints = spoken or (heard.column_names if heard is not None else None)
+    spoken = None if heard is None or heard.ros2 else heard.traces.names
+    hints = None if heard is None else heard.traces.names or heard.column_names
     mine, sure = chosen_joints(joints, count, wishes.joints, hints, wishes.urdf)
     names = list(wishes.names or spoken or [joint.name.removesuffix("_joint") for joint in mine])
     if len(names) != count:
@@ -80,6 +83,9 @@ def init(wishes: Wishes, console: Console, stop: StopFlag, ask: Ask | None = Non
     if ask is not None:
         names = names if spoken else names_asked(names, [joint.name for joint in mine], ask)
         drives = drives_asked(names, drives, ask)
+    if heard is not None and heard.ros2 and drives:
+        heard = in_strokes(heard, {i: drives[n] for i, n in enumerate(names) if n in drives})
+        measured = identify(heard.traces)
     axes = 0 if heard is None else heard.traces.axes.shape[1]
     plans = plan(mine, names, measured, drives, axes)
     console.print(_table(plans))
@@ -134,6 +140,9 @@ def _said(
     live = heard is not None and wishes.log is None
     base = f"rampe/{wishes.site}/{wishes.machine}".replace(" ", "-")
     keys = [f"{base}/joystick", f"{base}/actuators"]
+    ros2 = block_of(wishes) if wishes.format == "ros2" else None
+    if ros2 is not None:
+        keys = list(speech(wishes).said.values())
     log: dict[str, Any] | None = None
     if heard is not None:
         log = kept_log(folder, heard, plans, live=live)
@@ -142,7 +151,7 @@ def _said(
     packages = tuple(relative(folder, Path(one)) for one in wishes.package_dirs)
     origin = f"{Path(wishes.urdf).name}" + ("" if heard is None else f" and {heard.origin}")
     return SiteText(
-        ros2=heard is not None and heard.ros2,
+        ros2=ros2,
         site=wishes.site,
         machine=wishes.machine,
         joystick=keys[0],

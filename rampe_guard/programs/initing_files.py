@@ -36,7 +36,7 @@ class SiteText:
         plain: messages without certificates may leave the machine.
         timeout_s: of both inputs, where they come rarely.
         log: columns of a CSV log, if it came from one.
-        ros2: messages are those of ROS 2, and keys are topics.
+        ros2: how ROS 2 is spoken, where it is; then keys are topics.
     """
 
     site: str
@@ -53,7 +53,7 @@ class SiteText:
     plain: bool = False
     timeout_s: Said | None = None
     log: Mapping[str, Any] | None = None
-    ros2: bool = False
+    ros2: Mapping[str, Said] | None = None
 
 
 def site_text(said: SiteText) -> str:
@@ -76,9 +76,10 @@ def site_text(said: SiteText) -> str:
         joystick=said.joystick, actuators=said.actuators, base=f"{base}/guard"
     )
     root["keys"].yaml_add_eol_comment("all that the guard publishes lies below", key="base")
-    if said.ros2:
+    if said.ros2 is not None:
         root["format"] = "ros2"
         root.yaml_add_eol_comment("sensor_msgs/Joy and JointState; keys are topics", key="format")
+        root["ros2"] = _ros2(said.ros2)
     root["arm"] = _arm(said)
     root["scene"] = "scene.yaml"
     if said.allow:
@@ -149,6 +150,13 @@ objects:
 def relative(folder: Path, file: Path) -> str:
     """``file`` as seen from ``folder``, both with links resolved."""
     return Path(os.path.relpath(file.resolve(), folder.resolve())).as_posix()
+
+
+def _ros2(said: Mapping[str, Said]) -> CommentedMap:
+    block = CommentedMap({key: value.value for key, value in said.items()})
+    for key, value in said.items():
+        block.yaml_add_eol_comment(value.comment, key=key)
+    return block
 
 
 def _arm(said: SiteText) -> CommentedMap:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 from rampe_guard.errors import SettingsError
+from rampe_guard.programs.initing_ros2 import ACTUATORS_TOPIC, JOYSTICK_TOPIC
 from rampe_guard.programs.initing_wishes import Wishes
+from rampe_guard.settings.ros2_keys import MOST_DOMAIN, Transport
 
+A = TypeVar("A", bound=str)
 Ask = Callable[[str], str]
 """Shows a prompt; returns the line that was typed, empty for the default."""
 
@@ -37,16 +40,32 @@ def source_asked(wishes: Wishes, ask: Ask) -> Wishes:
     end = _text(ask, "Zenoh endpoint to listen on, such as tcp/127.0.0.1:7447 (empty: none)", "")
     if not end:
         return wishes
+    wishes = replace(_format_asked(wishes, ask), connect=(end,))
     base = f"rampe/{wishes.site}/{wishes.machine}"
+    keys, what = (f"{base}/joystick", f"{base}/actuators"), "Key"
+    if wishes.format == "ros2":
+        keys, what = (JOYSTICK_TOPIC, ACTUATORS_TOPIC), "Topic"
     return replace(
         wishes,
-        connect=(end,),
-        joystick=_text(ask, "Key of the joystick", wishes.joystick or f"{base}/joystick"),
-        actuators=_text(ask, "Key of the actuators", wishes.actuators or f"{base}/actuators"),
+        joystick=_text(ask, f"{what} of the joystick", wishes.joystick or keys[0]),
+        actuators=_text(ask, f"{what} of the actuators", wishes.actuators or keys[1]),
         seconds=_number(
             ask, "Move each lever, gently and fully, both ways. Seconds", wishes.seconds
         ),
     )
+
+
+def _format_asked(wishes: Wishes, ask: Ask) -> Wishes:
+    """What the messages are, and how those of ROS 2 travel."""
+    said = wishes.format or _choice(ask, "Messages are json or ros2", ("json", "ros2"))
+    if said != "ros2":
+        return replace(wishes, format=said)
+    ways: tuple[Transport, ...] = ("rmw_zenoh", "ros2dds")
+    way = wishes.transport or _choice(ask, "They travel by rmw_zenoh or ros2dds", ways)
+    domain = wishes.domain
+    if way == "rmw_zenoh" and domain is None:
+        domain = int(_choice(ask, "ROS_DOMAIN_ID", tuple(map(str, range(MOST_DOMAIN + 1)))))
+    return replace(wishes, format=said, transport=way, domain=domain)
 
 
 def names_asked(names: Sequence[str], joints: Sequence[str], ask: Ask) -> list[str]:
@@ -115,6 +134,13 @@ def cylinder(text: str, where: str) -> dict[str, Any]:
 
 def _text(ask: Ask, question: str, default: str) -> str:
     return ask(f"{question} [{default}]: ").strip() or default
+
+
+def _choice(ask: Ask, question: str, answers: Sequence[A]) -> A:
+    """One of them; the first is the default."""
+    while (answer := _text(ask, question, answers[0])) not in answers:
+        pass
+    return next(one for one in answers if one == answer)
 
 
 def _number(ask: Ask, question: str, default: float | None) -> float:

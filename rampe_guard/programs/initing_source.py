@@ -12,13 +12,14 @@ from rich.console import Console
 from rampe_guard.core.identify import Measured
 from rampe_guard.errors import LogError, SettingsError
 from rampe_guard.programs.initing_plan import ActuatorPlan, Said
+from rampe_guard.programs.initing_ros2 import speech
 from rampe_guard.programs.initing_wishes import Wishes
-from rampe_guard.programs.measuring import Heard, heard_in_file, reasons
+from rampe_guard.programs.measuring import Heard, heard_in_file, heard_in_json, reasons
 from rampe_guard.programs.measuring_bag import heard_in_bag
 from rampe_guard.programs.measuring_csv import heard_in_csv
-from rampe_guard.programs.measuring_live import Listening, heard_live, write_csv
+from rampe_guard.programs.measuring_live import Listening, both_live, write_csv
+from rampe_guard.programs.measuring_ros2 import Joints, heard_in_ros2
 from rampe_guard.recording import is_mcap
-from rampe_guard.recording.bag import is_bag
 from rampe_guard.runtime.connecting import Network
 from rampe_guard.runtime.stopping import StopFlag
 from rampe_guard.settings import ColumnMap
@@ -35,17 +36,18 @@ def heard_by(
 ) -> Heard | None:
     """What there is to measure from; None if nothing was named. ``joints`` are those of the URDF.
 
+    ``wishes`` are settled: they have a format.
+
     Raises:
         LogError, SettingsError, ConnectionFailedError: it cannot be had.
     """
     if wishes.log is not None:
         return _of_file(wishes, joints, wishes.log)
-    if not wishes.connect and wishes.zenoh is None:
+    if not wishes.live:
         return None
-    if wishes.joystick is None or wishes.actuators is None:
-        raise SettingsError("to measure live, give --joystick KEY and --actuators KEY")
+    said, keys = _inputs(wishes)
     console.print(
-        f"listening for {wishes.seconds:g} s on {wishes.joystick} and {wishes.actuators}:\n"
+        f"listening for {wishes.seconds:g} s on {said[0]} and {said[1]}:\n"
         "move each lever in turn, both ways, fully and gently, and let go each time"
     )
     told = [_TELL_S]
@@ -53,16 +55,40 @@ def heard_by(
     def tell(passed_s: float, streams: list[Listening]) -> None:
         if passed_s >= told[0]:
             told[0] += _TELL_S
-            counts = ", ".join(f"{len(one.messages)} on {one.key}" for one in streams)
-            console.print(f"  {passed_s:.0f} s: {counts}")
+            counts = zip(streams, said, strict=True)
+            text = ", ".join(f"{len(one.messages)} on {name}" for one, name in counts)
+            console.print(f"  {passed_s:.0f} s: {text}")
 
     network = Network(wishes.connect, wishes.zenoh, wishes.plain_network)
-    return heard_live(network, wishes.joystick, wishes.actuators, wishes.seconds, stop, tell)
+    sticks, places = both_live(network, keys, wishes.seconds, stop, tell)
+    where = ", ".join(network.endpoints) or network.config or "the local router"
+    origin = f"{wishes.seconds:g} s at {where}"
+    if wishes.format == "ros2":
+        wanted = Joints(joints, wishes.joints)
+        heard = heard_in_ros2(sticks.messages, places.messages, said, wanted, origin)
+    else:
+        heard = heard_in_json(sticks.messages, places.messages, said, origin)
+    for name, one in (("joystick", sticks), ("actuators", places)):
+        heard.refused.update({f"{name}: {word}": count for word, count in one.refused.items()})
+    return heard
+
+
+def _inputs(wishes: Wishes) -> tuple[tuple[str, str], tuple[str, str]]:
+    """Both inputs as they were told, and their Zenoh keys."""
+    if wishes.format == "ros2":
+        spoken = speech(wishes)
+        both = "joystick", "actuators"
+        said, keys = ((way[both[0]], way[both[1]]) for way in (spoken.said, spoken.keys))
+        return said, keys
+    if wishes.joystick is None or wishes.actuators is None:
+        raise SettingsError("to measure live, give --joystick KEY and --actuators KEY")
+    keys = wishes.joystick, wishes.actuators
+    return keys, keys
 
 
 def _of_file(wishes: Wishes, joints: Sequence[str], path: str) -> Heard:
-    if is_bag(path):
-        wanted = wishes.joints or joints
+    if wishes.format == "ros2":
+        wanted = Joints(joints, wishes.joints)
         return heard_in_bag(path, wishes.joystick, wishes.actuators, wanted)
     if is_mcap(path):
         return heard_in_file(path, wishes.joystick, wishes.actuators)

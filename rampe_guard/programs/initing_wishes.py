@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, Self
 
+from rampe_guard.settings.ros2_keys import Transport
+
 
 @dataclass(frozen=True, slots=True)
 class Wishes:
@@ -20,7 +22,11 @@ class Wishes:
         connect: endpoints to listen on.
         zenoh: Zenoh configuration file instead.
         plain_network: messages without certificates may leave the machine.
-        joystick, actuators: keys; for a CSV log columns, with commas.
+        format: of the messages, json or ros2; None: what the recording is, else json.
+        transport: what lies between ROS 2 and Zenoh.
+        domain: ROS_DOMAIN_ID.
+        type_hash: keys of rmw_zenoh end with the hash of the type.
+        joystick, actuators: keys; topics of ROS 2; for a CSV log columns, with commas.
         seconds: for how long to listen [s].
         joints: of the positions, in their order.
         names: of the actuators, in the same order.
@@ -38,6 +44,10 @@ class Wishes:
     connect: tuple[str, ...] = ()
     zenoh: str | None = None
     plain_network: bool = False
+    format: str | None = None
+    transport: Transport | None = None
+    domain: int | None = None
+    type_hash: bool = True
     joystick: str | None = None
     actuators: str | None = None
     seconds: float = 60.0
@@ -46,6 +56,11 @@ class Wishes:
     cylinders: tuple[str, ...] = ()
     package_dirs: tuple[str, ...] = ()
     force: bool = False
+
+    @property
+    def live(self) -> bool:
+        """The machine itself is listened to."""
+        return self.log is None and (bool(self.connect) or self.zenoh is not None)
 
     @classmethod
     def of(cls, args: Mapping[str, Any]) -> Self:

@@ -20,6 +20,7 @@ from rampe_guard.core.types import FloatArray
 from rampe_guard.errors import LogError, MessageError
 from rampe_guard.recording import McapReading, is_mcap
 from rampe_guard.recording.channels import role_of
+from rampe_guard.runtime.decoding import Decoders
 from rampe_guard.wire.codec import MAX_PAYLOAD_BYTES, Message
 from rampe_guard.wire.inputs import MAX_VALUE
 
@@ -29,6 +30,10 @@ Arrived = tuple[float, bytes]
 """When a message came [s], and the message."""
 _SAMPLE = 50
 """Messages of a topic that are looked at to find out what it is."""
+_JSON = Decoders(
+    lambda payload: wire.decode(payload, wire.JoystickMessage, limit=MAX_PAYLOAD_BYTES),
+    lambda payload: wire.decode(payload, wire.ActuatorsMessage, limit=MAX_PAYLOAD_BYTES),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +47,7 @@ class Heard:
         origin: where it comes from, in words.
         refused: reasons of messages that could not be used, and how many.
         columns: of a CSV log, as a site file's ``log`` has them; None for anything else.
-        ros2: its messages are those of ROS 2, and its keys topics.
+        ros2: its messages are those of ROS 2, its keys topics, and its names those of joints.
     """
 
     traces: Traces
@@ -102,14 +107,44 @@ def heard_in_file(path: str, joystick: str | None, actuators: str | None) -> Hea
         if topic not in by_topic:
             known = ", ".join(sorted(by_topic))
             raise LogError(f"{path}: no topic {topic!r} for --{what}; it has {known}")
-    traces, refused = traces_of(by_topic[found["joystick"]], by_topic[found["actuators"]])
-    if not len(traces.time_s) or not len(traces.lever_s):
-        raise LogError(f"{path}: no usable message of both inputs{reasons(refused)}")
-    return Heard(traces, found["joystick"], found["actuators"], Path(path).name, refused)
+    topics = found["joystick"], found["actuators"]
+    levers, positions = (by_topic[topic] for topic in topics)
+    return heard_in_json(levers, positions, topics, Path(path).name)
+
+
+def heard_in_json(
+    levers: Sequence[Arrived], positions: Sequence[Arrived], keys: tuple[str, str], origin: str
+) -> Heard:
+    """Both inputs, of messages of our own.
+
+    Args:
+        levers: of the joystick.
+        positions: of the actuators.
+        keys: of the same.
+        origin: where they come from, in words.
+
+    Raises:
+        LogError: none of them can be used.
+    """
+    return heard_of(levers, positions, _JSON, keys, origin)
+
+
+def heard_of(
+    levers: Sequence[Arrived],
+    positions: Sequence[Arrived],
+    decoders: Decoders,
+    keys: tuple[str, str],
+    origin: str,
+) -> Heard:
+    """The same of messages that ``decoders`` read."""
+    traces, refused = traces_of(levers, positions, decoders)
+    if not (traces.axes.size and traces.position.size):
+        raise LogError(f"{origin}: no usable message of both inputs{reasons(refused)}")
+    return Heard(traces, *keys, origin, refused)
 
 
 def traces_of(
-    levers: Iterable[Arrived], positions: Iterable[Arrived]
+    levers: Iterable[Arrived], positions: Iterable[Arrived], decoders: Decoders = _JSON
 ) -> tuple[Traces, Counter[str]]:
     """Decoded messages, and the reasons of those that could not be used.
 
@@ -117,8 +152,8 @@ def traces_of(
     that any message took: so a sender with another clock does no harm. Else they are the arrivals.
     """
     refused: Counter[str] = Counter()
-    sticks = _decoded(levers, wire.JoystickMessage, "joystick", refused)
-    places = _decoded(positions, wire.ActuatorsMessage, "actuators", refused)
+    sticks = _decoded(levers, decoders.joystick, "joystick", refused)
+    places = _decoded(positions, decoders.actuators, "actuators", refused)
     sticks = _alike(sticks, lambda m: m.axes, "joystick", refused)
     places = _alike(places, lambda m: m.position, "actuators", refused)
     names = places[0][1].name if places else None
@@ -151,12 +186,12 @@ def on_our_clock(times: Sequence[tuple[float, float | None]]) -> FloatArray:
 
 
 def _decoded(
-    arrived: Iterable[Arrived], kind: type[M], what: str, refused: Counter[str]
+    arrived: Iterable[Arrived], decode: Callable[[bytes], M], what: str, refused: Counter[str]
 ) -> list[tuple[float, M]]:
     found = []
     for at_s, payload in arrived:
         try:
-            found.append((at_s, wire.decode(payload, kind, limit=MAX_PAYLOAD_BYTES)))
+            found.append((at_s, decode(payload)))
         except MessageError as error:
             refused[f"{what}: {error.reason}"] += 1
     return found

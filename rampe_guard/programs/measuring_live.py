@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import csv
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Self
 
 from rampe_guard.errors import LogError
-from rampe_guard.programs.measuring import Arrived, Heard, reasons, traces_of
+from rampe_guard.programs.measuring import Arrived, Heard
 from rampe_guard.runtime.connecting import Network
 from rampe_guard.runtime.stopping import StopFlag
-from rampe_guard.runtime.zenoh_io import Bus, Inbox, check_key_expression
+from rampe_guard.runtime.zenoh_io import Bus, Inbox, check_key_expression, is_pattern
+from rampe_guard.settings.ros2_keys import in_words, strangers, topic_of, why_strange
 
 LOOK_S = 0.002
 """Period of looking: a message counts as arrived at most so much late [s]."""
@@ -25,20 +28,48 @@ MOST_MESSAGES = 2_000_000
 
 @dataclass(slots=True)
 class Listening:
-    """One key being heard; ``strangers`` counts puts on a wildcard, which no guard takes."""
+    """One key being heard.
+
+    Attributes:
+        key: exact.
+        inbox: of it.
+        others: where the same topic of ROS 2 lies with another type or hash, if anywhere.
+        messages: that came.
+        refused: puts on a wildcard or with another type, which no guard takes.
+        why: of the last with another type, in words.
+    """
 
     key: str
     inbox: Inbox
+    others: Inbox | None = None
     messages: list[Arrived] = field(default_factory=list)
-    strangers: int = 0
+    refused: Counter[str] = field(default_factory=Counter)
+    why: str = ""
+
+    @classmethod
+    def on(cls, bus: Bus, key: str) -> Self:
+        """Begin to hear a key."""
+        pattern = strangers(key)
+        others = None if pattern is None else bus.inbox(pattern, _RING)
+        return cls(key, bus.inbox(key, _RING), others)
 
     def take(self, now_s: float) -> None:
         """Take what waits."""
         for message in self.inbox.drain():
             if message.key != self.key:
-                self.strangers += 1
+                self.refused["wildcard_key"] += 1
             elif len(self.messages) < MOST_MESSAGES:
                 self.messages.append((now_s, message.payload))
+        for message in () if self.others is None else self.others.drain():
+            if message.key != self.key and not is_pattern(message.key):
+                word, self.why = why_strange(message.key, self.key)
+                self.refused[word] += 1
+
+    def close(self) -> None:
+        """Hear no more."""
+        self.inbox.close()
+        if self.others is not None:
+            self.others.close()
 
 
 def listen(
@@ -57,7 +88,7 @@ def listen(
         stop: ends it early.
         tell: told about once a second how long it has been [s], and what was heard so far.
     """
-    heard = [Listening(key, bus.inbox(key, _RING)) for key in keys]
+    heard = [Listening.on(bus, key) for key in keys]
     began_s = time.monotonic()
     ahead_s = time.time() - began_s
     told_s = 0.0
@@ -70,46 +101,39 @@ def listen(
             tell(passed_s, heard)
     for one in heard:
         one.take(time.monotonic() + ahead_s)
-        one.inbox.close()
+        one.close()
     return heard
 
 
-def heard_live(
+def both_live(
     network: Network,
-    joystick: str,
-    actuators: str,
+    keys: tuple[str, str],
     seconds: float,
     stop: StopFlag,
     tell: Callable[[float, list[Listening]], None] | None = None,
-) -> Heard:
-    """Both inputs of a machine from its network.
+) -> tuple[Listening, Listening]:
+    """Both inputs of a machine from its network: the joystick's key, and the actuators'.
 
     Raises:
         ConnectionFailedError: no router answers.
         LogError: an input is silent; says which keys are not.
         SettingsError: a key is none.
     """
-    for key in (joystick, actuators):
+    for key in keys:
         check_key_expression(key)
     with Bus.open(network.settings) as bus:
-        sticks, places = listen(bus, (joystick, actuators), seconds, stop, tell)
-        silent = [one.key for one in (sticks, places) if not one.messages]
+        sticks, places = listen(bus, keys, seconds, stop, tell)
+        silent = [one for one in (sticks, places) if not one.messages]
         if silent:
-            raise LogError(
-                f"nothing came on {' and '.join(silent)} within {seconds:g} s; {_lively(bus, stop)}"
-            )
-    traces, refused = traces_of(sticks.messages, places.messages)
-    refused["joystick: wildcard_key"] += sticks.strangers
-    refused["actuators: wildcard_key"] += places.strangers
-    refused = +refused
-    if not len(traces.time_s) or not len(traces.lever_s):
-        raise LogError(f"no usable message of both inputs{reasons(refused)}")
-    where = ", ".join(network.endpoints) or network.config or "the local router"
-    return Heard(traces, joystick, actuators, f"{seconds:g} s at {where}", refused)
+            named = " and ".join(one.key for one in silent)
+            strange = "; ".join(one.why for one in silent if one.why)
+            told = strange or _lively(bus, stop, [topic_of(one.key) for one in silent])
+            raise LogError(f"nothing came on {named} within {seconds:g} s; {told}")
+    return sticks, places
 
 
-def _lively(bus: Bus, stop: StopFlag) -> str:
-    """Which keys are put on, in words."""
+def _lively(bus: Bus, stop: StopFlag, topics: Sequence[str]) -> str:
+    """Which keys are put on, in words; first those that carry one of the ``topics``."""
     inbox = bus.inbox("**", _RING)
     seen: set[str] = set()
     until_s = time.monotonic() + _SEARCH_S
@@ -118,7 +142,7 @@ def _lively(bus: Bus, stop: StopFlag) -> str:
     inbox.close()
     if not seen:
         return "nor on any other key of this router: is the machine's publisher running?"
-    keys = sorted(seen)
+    keys = [in_words(key) for key in sorted(seen, key=lambda k: (topic_of(k) not in topics, k))]
     more = f" and {len(keys) - _MOST_KEYS} more" if len(keys) > _MOST_KEYS else ""
     return f"there are messages on {', '.join(keys[:_MOST_KEYS])}{more}"
 

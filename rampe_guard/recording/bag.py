@@ -76,7 +76,7 @@ class BagReading:
         last_ns = self.first_ns
         with opened(self.path) as reader:
             ours = [c for c in reader.connections if c.topic in self._wanted]
-            for connection, at_ns, payload in _guarded(self.path, reader, ours):
+            for connection, at_ns, payload in guarded(self.path, reader, ours):
                 if at_ns < last_ns:
                     raise LogError(
                         f"{self.path}: messages are not in order of time: {at_ns} ns follows"
@@ -114,9 +114,14 @@ def opened(path: str) -> Iterator[Reader]:
         reader.close()
 
 
-def _guarded(
+def guarded(
     path: str, reader: Reader, connections: list[Connection]
 ) -> Iterator[tuple[Connection, int, bytes]]:
+    """Messages of an open bag: on what, when it arrived [ns since 1970], and its bytes.
+
+    Raises:
+        LogError: the bag is damaged.
+    """
     try:
         for connection, at_ns, payload in reader.messages(connections):
             yield connection, at_ns, bytes(payload)

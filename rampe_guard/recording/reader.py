@@ -21,7 +21,16 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata, Statistics
+from mcap.records import (
+    Attachment,
+    Channel,
+    Chunk,
+    McapRecord,
+    Message,
+    Metadata,
+    Schema,
+    Statistics,
+)
 from mcap.stream_reader import breakup_chunk, get_chunk_data_stream
 
 from rampe_guard.errors import LogError
@@ -54,6 +63,7 @@ class McapReading:
         warnings: what was left out, if anything.
         metadata: records of words by name; the last of each name.
         channels: those that hold messages.
+        types: names of the schemas of their messages, by the number in a channel.
         counts: messages by topic.
         first_ns: of the first message [ns since 1970].
         last_ns: of the last.
@@ -66,6 +76,7 @@ class McapReading:
         self.path = str(path)
         self.metadata: dict[str, dict[str, str]] = {}
         self.channels: dict[int, Channel] = {}
+        self.types: dict[int, str] = {}
         self.counts: Counter[str] = Counter()
         try:
             with Path(path).open("rb") as file:
@@ -88,6 +99,8 @@ class McapReading:
         for record in self._data():
             if isinstance(record, Channel):
                 channels[record.id] = record
+            elif isinstance(record, Schema):
+                self.types[record.id] = record.name
             elif isinstance(record, Message):
                 channel = channels.get(record.channel_id)
                 if channel is None:
@@ -123,10 +136,13 @@ class McapReading:
         return first_ns, last_ns
 
     def _data(self) -> Iterator[McapRecord]:
-        """Channels and messages, in chunks or not."""
-        for opcode, content in self._records(Opcode.CHUNK, Opcode.CHANNEL, Opcode.MESSAGE):
+        """Schemas, channels and messages, in chunks or not."""
+        wanted = Opcode.CHUNK, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE
+        for opcode, content in self._records(*wanted):
             if opcode == Opcode.CHUNK:
                 yield from breakup_chunk(unpacked(Chunk.read(_stream(content))))
+            elif opcode == Opcode.SCHEMA:
+                yield Schema.read(_stream(content))
             elif opcode == Opcode.CHANNEL:
                 yield Channel.read(_stream(content))
             else:

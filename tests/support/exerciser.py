@@ -1,23 +1,25 @@
 """The machine of `small_arm`, live, a process of its own: all levers at work without end.
 
-    python -m tests.support.exerciser ENDPOINT JOYSTICK ACTUATORS
+    python -m tests.support.exerciser ENDPOINT JOYSTICK ACTUATORS [ros2]
 
-Each lever in turn is pushed one way, and then the other. Lines of JSON on stdin change what is
-sent:
+With ``ros2`` it speaks as drivers of ROS 2 do, on these Zenoh keys. Each lever in turn is pushed
+one way, and then the other. Lines of JSON on stdin change what is sent:
 
 ``{"joystick": false}``   the levers are not sent any more
 ``{"skew_s": 2.0}``       the stamps of the levers are so much ahead [s]
 ``{"flip": true}``        the levers are sent with the other sign
-``{"rubbish": true}``     every tenth message of the actuators is no JSON
+``{"rubbish": true}``     every tenth message of the actuators is cut short
 """
 
 from __future__ import annotations
 
 import json
+import math
 import queue
 import sys
 import threading
 import time
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -26,13 +28,50 @@ import zenoh
 from rampe_guard.simulate.machine import at_rest, measure, step
 from tests.support import small_arm
 from tests.support.ears import open_session
+from tests.support.ros2 import Sender, joint_state, joy
 
 _RATE_HZ = 50.0
 _SLOT, _PUSH = 35, 16
 """Ticks for each lever in turn, and how many of them it is pushed."""
 
 
-def work(session: zenoh.Session, joystick: str, actuators: str) -> None:
+class Json:
+    """Puts both inputs as rampe-guard's own messages."""
+
+    def __init__(self, session: zenoh.Session, joystick: str, actuators: str) -> None:
+        self._session, self._keys = session, (joystick, actuators)
+
+    def levers(self, axes: Sequence[float], stamp_s: float) -> None:
+        self._session.put(self._keys[0], json.dumps({"stamp": stamp_s, "axes": list(axes)}))
+
+    def positions(self, position: Sequence[float], stamp_s: float, *, cut: bool) -> None:
+        said = json.dumps({"stamp": stamp_s, "position": list(position)})
+        self._session.put(self._keys[1], "{" if cut else said)
+
+
+class Ros2:
+    """Puts both as drivers of ROS 2 do: the joints in another order, and among others."""
+
+    def __init__(self, session: zenoh.Session, joystick: str, actuators: str) -> None:
+        self._session, self._keys = session, (joystick, actuators)
+        self._senders = Sender(b"j" * 16), Sender(b"a" * 16)
+
+    def levers(self, axes: Sequence[float], stamp_s: float) -> None:
+        self._put(0, joy(axes, stamp_s))
+
+    def positions(self, position: Sequence[float], stamp_s: float, *, cut: bool) -> None:
+        turn, lift, reach = position
+        angles = {"camera": math.nan, "reach": reach, "lift": lift, "turn": turn}
+        said = joint_state(angles, stamp_s)
+        self._put(1, said[:40] if cut else said)
+
+    def _put(self, which: int, payload: bytes) -> None:
+        """Numbered as rmw_zenoh does it."""
+        attachment = self._senders[which].attachment()
+        self._session.put(self._keys[which], payload, attachment=attachment)
+
+
+def work(voice: Json | Ros2) -> None:
     """Until stdin ends."""
     words: queue.SimpleQueue[str] = queue.SimpleQueue()
 
@@ -63,11 +102,9 @@ def work(session: zenoh.Session, joystick: str, actuators: str) -> None:
         position, _ = measure(machine, state, rng)
         now_s = time.time()
         if told["joystick"]:
-            message = {"stamp": now_s + told["skew_s"], "axes": axes.tolist()}
-            session.put(joystick, json.dumps(message))
-        message = {"stamp": now_s, "position": position.tolist()}
-        bad = told["rubbish"] and count % 10 == 0
-        session.put(actuators, "{" if bad else json.dumps(message))
+            voice.levers(axes.tolist(), now_s + told["skew_s"])
+        cut = bool(told["rubbish"]) and count % 10 == 0
+        voice.positions(position.tolist(), now_s, cut=cut)
         state = step(machine, state, lever, 1.0 / _RATE_HZ)
         count += 1
         due_s += 1.0 / _RATE_HZ
@@ -77,4 +114,5 @@ def work(session: zenoh.Session, joystick: str, actuators: str) -> None:
 if __name__ == "__main__":
     with open_session(sys.argv[1]) as opened:
         print("ready", flush=True)
-        work(opened, sys.argv[2], sys.argv[3])
+        speaks = Ros2 if sys.argv[4:] == ["ros2"] else Json
+        work(speaks(opened, sys.argv[2], sys.argv[3]))

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import io
 import json
-import math
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from rich.console import Console
-from rosbags.rosbag2 import StoragePlugin, Writer
 
 from rampe_guard.core.drive import CylinderDrive
 from rampe_guard.errors import LogError, SettingsError
@@ -20,13 +18,10 @@ from rampe_guard.programs.initing_questions import cylinder
 from rampe_guard.programs.initing_wishes import Wishes
 from rampe_guard.programs.measuring import heard_in_file, traces_of
 from rampe_guard.programs.measuring_csv import column_maps
-from rampe_guard.ros2 import cdr
 from rampe_guard.runtime.stopping import StopFlag
 from rampe_guard.settings import load_site
-from rampe_guard.settings.ros2_keys import JOINT_STATE, JOY
 from tests.support import small_arm
 from tests.support.processes import called
-from tests.support.ros2 import joint_state, joy
 
 BENCH_LOG = Path(__file__).parents[1] / "replay" / "bench.mcap"
 COLUMNS = ("--time", "t", "--joystick", "a0,a1,a2", "--actuators", "turn,lift,reach")
@@ -231,31 +226,6 @@ def test_a_recording_is_known_by_the_roles_of_its_channels() -> None:
     assert heard.refused["joystick: bad_json"] == 1  # somebody sent rubbish
     with pytest.raises(LogError, match="no topic 'a/b' for --joystick; it has rampe/bench"):
         heard_in_file(str(BENCH_LOG), "a/b", None)
-
-
-def test_a_ros_bag_becomes_a_site(tmp_path: Path, place: Path) -> None:
-    """Its joints by their names, in any order and among others."""
-    bag = tmp_path / "bag"
-    moments = small_arm.ticks(rate_hz=25.0, pushes=1)
-    with Writer(bag, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
-        levers = writer.add_connection("/joy", JOY.name, typestore=cdr.store())
-        joints = writer.add_connection("/joints", JOINT_STATE.name, typestore=cdr.store())
-        for tick in moments:
-            turn, lift, reach = tick.position.tolist()
-            angles = {"camera": math.nan, "reach": reach, "lift": lift, "turn": turn}
-            at_s = 1e9 + tick.time_s
-            writer.write(levers, round(at_s * 1e9), joy(tick.axes.tolist(), at_s))
-            writer.write(joints, round(at_s * 1e9), joint_state(angles, at_s))
-    code, out, err = _init(place, tmp_path / "site", "--log", str(bag))
-    assert (code, err) == (0, ""), out
-    site = load_site(tmp_path / "site" / "site.yaml")
-    assert site.format == "ros2"
-    assert site.keys.joystick.startswith("0/joy/")
-    assert [j.joint for j in site.arm.joints] == ["turn", "lift", "reach"]
-    assert [(a.axis, a.sign) for a in site.guard.actuators] == [(2, 1), (0, -1), (1, 1)]
-    code, _, err = _init(place, tmp_path / "other", "--log", str(bag), "--joystick", "/stick")
-    assert code == 2
-    assert "no /stick of sensor_msgs/msg/Joy" in err
 
 
 def test_messages_that_name_their_actuators() -> None:
