@@ -36,9 +36,11 @@ def _run(args: argparse.Namespace) -> int:
         return Supervisor(
             guard_command, log_format=args.log_format, spare_after_s=spare_after_s
         ).run()
+    from rampe_guard.runtime.allocator import keep_level
     from rampe_guard.runtime.stopping import StopFlag
 
     stop = StopFlag.on_signals()  # before the imports, which take a while
+    keep_level()
     take_name()
     end_with_parent()
     faulthandler.enable()  # where a crash in native code came from
