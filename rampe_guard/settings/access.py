@@ -17,7 +17,8 @@ from rampe_guard.settings.access_model import (
 )
 from rampe_guard.settings.explain import validate
 from rampe_guard.settings.problems import KeyPath, Problems, did_you_mean, show
-from rampe_guard.settings.ros2_keys import DIAGNOSTICS, DIAGNOSTICS_TOPIC, MARKERS
+from rampe_guard.settings.published import PUBLISHED
+from rampe_guard.settings.ros2_keys import MARKERS
 from rampe_guard.settings.source import Document, parse, read_bytes
 
 
@@ -62,15 +63,16 @@ def _check_endpoints(router: RouterModel, add: _Add) -> None:
 def _check_machines(access: AccessModel, add: _Add) -> None:
     within = access.read.removesuffix("**")
     owned = Counter(key for machine in access.machines for _, key in _owned(machine))
-    shared = {key for machine in access.machines if (key := _diagnostics(machine)) is not None}
+    told = {key for machine in access.machines for key in _told(machine)}
     for place, machine in enumerate(access.machines):
         at: KeyPath = ("machines", place)
         for field, key in _owned(machine):
             if owned[key] > 1:
                 add((*at, field), f"{show(key)} is there twice", _OWN[field])
-            if field in _INPUTS and key in shared:
-                what = f"{show(key)} is where guards publish their diagnostics"
-                add((*at, field), what, "give another topic")
+        for field, key in _heard(machine):
+            if key in told:
+                what = f"{show(key)} is a key that a guard publishes or answers on"
+                add((*at, field), what, "give another")
         for field, key in _keys(machine):
             if not key.startswith(within):
                 what = f"{show(key)} is not below read, {access.read}"
@@ -95,15 +97,26 @@ def _owned(machine: MachineModel) -> Iterable[tuple[str, str]]:
         yield "ros2", ros.key(ros.markers_topic, MARKERS)
 
 
-def _diagnostics(machine: MachineModel) -> str | None:
-    """Where its guard says in ROS 2 how it is: a topic that all of a domain share."""
-    ros = machine.speech.settings
-    return ros.key(DIAGNOSTICS_TOPIC, DIAGNOSTICS) if ros is not None and ros.publish else None
+def _told(machine: MachineModel) -> Iterable[str]:
+    """Keys on which its guard is believed."""
+    yield from (f"{machine.base}/{word}" for word in PUBLISHED)
+    if (ros := machine.speech.settings) is not None:
+        yield from (ros.key(topic, kind) for topic, kind in ros.published)
+
+
+def _heard(machine: MachineModel) -> Iterable[tuple[str, str]]:
+    """Keys that somebody else than a guard publishes on."""
+    yield from machine.speech.keys.items()
+    if machine.enabled is not None:
+        yield "enabled", machine.enabled
+    for key in machine.objects:
+        yield "objects", key
 
 
 def _keys(machine: MachineModel) -> Iterable[tuple[str, str]]:
     """Keys that must lie below read; topics lie where ROS 2 has them."""
-    inputs = _INPUTS if machine.format == "json" else ()
+    topics = machine.format == "ros2"
+    inputs = [name for name in _INPUTS if not topics and not getattr(machine, name).startswith("/")]
     for field in ("base", *inputs, "enabled", "joystick_alive"):
         if (key := getattr(machine, field)) is not None:
             yield field, key

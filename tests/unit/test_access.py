@@ -147,6 +147,7 @@ def test_plain_messages_are_for_the_router_s_own_host() -> None:
         ("rampe/s/b/joystick", "rampe/s/a/joystick", "is there twice"),
         ("rampe/s/b/joystick", "other/b/joystick", "is not below read, rampe/**"),
         ("name: b", "name: a", "'a' is there twice"),
+        ("[rampe/s/truck]", "[rampe/s/b/guard/alert]", "is a key that a guard publishes"),
         ("/tls}", "/tls, listen: [tcp/0.0.0.0:7447]}", "'tcp/0.0.0.0:7447' is not encrypted"),
         ("/tls}", "/tls, lisen: []}", "lisen"),
         ("certificate: one", "certificate: 'one, two'", "access[0].certificate"),

@@ -131,6 +131,7 @@ B = "joystick: rampe/s/b/joystick, actuators: rampe/s/b/actuators"
         ("/joy,", "/9joy,", "machines[0].joystick: '/9joy' is no ROS 2 topic"),
         ("/joy,", f"3/joy/{JOY.dds}/RIHS01_0,", "has not the hash of sensor_msgs/msg/Joy"),
         ("/joy,", '"/*",', "machines[0].joystick"),
+        ("/joy,", "rampe/s/b/guard/alert,", "is a key that a guard publishes or answers on"),
         ("[/arm/driver]", "[driver]", "machines[0].ros2_nodes[0]: 'driver' has not the form"),
         ("[/arm/driver]", "[/rampe_guard]", "'/rampe_guard' is the node of a guard"),
         ("domain: 3", "transport: ros2dds", "machines[0].ros2_nodes: is given, and only nodes of"),
@@ -148,7 +149,7 @@ B = "joystick: rampe/s/b/joystick, actuators: rampe/s/b/actuators"
         (
             B,
             "format: ros2, ros2: {transport: ros2dds}, joystick: /diagnostics, actuators: /j",
-            "'diagnostics' is where guards publish their diagnostics",
+            "machines[1].joystick: 'diagnostics' is a key that a guard publishes or answers on",
         ),
     ],
 )
