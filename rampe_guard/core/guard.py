@@ -227,14 +227,14 @@ class Guard:
             if isinstance(lever, Rejection):
                 self._refuse(lever.input, lever.reason, now_s)
                 return [RefusalEvent(lever.input, lever.reason, lever.detail)]
-            self._monitor.accept("joystick", sample.arrival_s, stamp_of(sample))
+            self._monitor.accept("joystick", sample.arrival_s, stamp_of(sample), lever.late_s)
             self._restart(lever)
             return [*self._intention.joystick(lever.sample, now_s, learn=learn)]
         moved = self._gate.actuators(sample)
         if isinstance(moved, Rejection):
             self._refuse(moved.input, moved.reason, now_s)
             return [RefusalEvent(moved.input, moved.reason, moved.detail)]
-        self._monitor.accept("actuators", sample.arrival_s, stamp_of(sample))
+        self._monitor.accept("actuators", sample.arrival_s, stamp_of(sample), moved.late_s)
         self._moving.follow(sample, restarted=moved.restarted)
         self._enable.moved(sample, restarted=moved.restarted)
         self._restart(moved)

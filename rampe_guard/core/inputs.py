@@ -14,11 +14,15 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 
 from rampe_guard.core.config import ActuatorConfig, InputConfig
+from rampe_guard.core.sender_clock import SenderClock
 from rampe_guard.core.types import ActuatorSample, FloatArray, InputName, JoystickSample
 
 
 class Stamped(Protocol):
-    """A sample with the time of its measurement and that of its arrival [s]."""
+    """A sample with the time of its measurement and that of its arrival [s].
+
+    ``stamped``: the sender says when; else its arrival stands for it.
+    """
 
     @property
     def stamp_s(self) -> float:
@@ -30,6 +34,11 @@ class Stamped(Protocol):
         """On ours."""
         ...
 
+    @property
+    def stamped(self) -> bool:
+        """The sender says when it was measured."""
+        ...
+
 
 S = TypeVar("S", bound=Stamped)
 
@@ -38,6 +47,8 @@ AXIS_SLACK = 0.05
 _MIN_STEP_S = 0.05
 """Two samples closer than this still may differ by the encoder's last digits and jitter."""
 _BURST_S = 0.2
+_CLOCK_SET = 3
+"""So many samples in a row that go back together have another clock; fewer are out of order."""
 _LONG_SLACK = 1.5
 """Over a longer gap than a burst no actuator keeps up several times its top speed."""
 
@@ -61,14 +72,25 @@ class Fault:
 
 @dataclass(frozen=True, slots=True)
 class Accepted(Generic[S]):
-    """A sample fit for use; ``restarted`` when it does not continue the one before it."""
+    """A sample fit for use.
+
+    Attributes:
+        sample: itself.
+        restarted: it does not continue the one before it.
+        late_s: how long it was under way, at least, as the sender's promptest sample shows [s].
+    """
 
     sample: S
     restarted: bool = False
+    late_s: float = 0.0
 
 
 class Continuity(Generic[S]):
-    """Does a sample continue the last good one, or has the sender started anew?
+    """Does a sample continue the last good one, or has the sender started anew? How late is it?
+
+    A network that stood still hands on at once what it kept. The first of that continues what
+    was before, but is old; the last of it is far ahead of the first, but no further than the
+    sender's clock has gone meanwhile.
 
     Args:
         patience_s: how long a sender that started anew is refused [s].
@@ -85,29 +107,42 @@ class Continuity(Generic[S]):
         self._good: S | None = None
         self._suspect: S | None = None
         self._suspect_since_s = 0.0
+        self._suspects = 0
+        self._clock, self._suspect_clock = SenderClock(), SenderClock()
 
     def check(self, sample: S, speed: FloatArray | None = None) -> Accepted[S] | Fault:
         """Whether it does; ``speed`` are top speeds (n,) by which positions are judged too."""
         if self._good is None:
-            self._good = sample
-            return Accepted(sample)
-        broken = self._break(self._good, sample, speed)
+            return self._accept(sample, self._clock)
+        broken = self._break(self._good, sample, speed, self._clock)
         if broken is None:
-            self._good, self._suspect = sample, None
-            return Accepted(sample)
-        if self._suspect is None or self._break(self._suspect, sample, speed) is not None:
-            self._suspect_since_s = sample.arrival_s
-        self._suspect = sample
+            # a sender whose clock was set back a little is waited for, and goes by its new clock
+            set_back = self._suspects >= _CLOCK_SET
+            return self._accept(sample, self._suspect_clock if set_back else self._clock)
+        if self._suspect is None or self._break(self._suspect, sample, speed, self._suspect_clock):
+            self._suspect_since_s, self._suspects = sample.arrival_s, 0
+            self._suspect_clock = SenderClock()
+        self._suspect, self._suspects = sample, self._suspects + 1
+        self._suspect_clock = _followed(self._suspect_clock, sample)
         if sample.arrival_s - self._suspect_since_s >= self._patience_s:
-            self._good, self._suspect = sample, None
-            return Accepted(sample, restarted=True)
+            return replace(self._accept(sample, self._suspect_clock), restarted=True)
         return broken
 
-    def _break(self, old: S, new: S, speed: FloatArray | None) -> Fault | None:
+    def _accept(self, sample: S, clock: SenderClock) -> Accepted[S]:
+        self._good, self._suspect, self._suspects = sample, None, 0
+        self._clock = _followed(clock, sample)
+        if not sample.stamped:
+            return Accepted(sample)
+        measured_s = self._clock.measured_s(sample.stamp_s, sample.arrival_s)
+        return Accepted(sample, late_s=sample.arrival_s - measured_s)
+
+    def _break(self, old: S, new: S, speed: FloatArray | None, clock: SenderClock) -> Fault | None:
         step = new.stamp_s - old.stamp_s
         if step <= 0.0:
             return Fault("stamp_back", f"stamp {new.stamp_s:.6g} after {old.stamp_s:.6g}")
         passed = new.arrival_s - old.arrival_s
+        if old.stamped and clock.ahead_s is not None:  # the old one may have been late
+            passed = max(passed, new.arrival_s + clock.ahead_s - old.stamp_s)
         if step - passed > self._max_stamp_jump_s:
             return Fault("stamp_jump", f"stamp went {step:.3g} s ahead while {passed:.3g} s passed")
         if speed is None or not (
@@ -122,6 +157,10 @@ class Continuity(Generic[S]):
             j = int(np.argmax(moved - reach))
             return Fault("position_jump", f"actuator {j} moved {moved[j]:.4g} in {step:.3g} s")
         return None
+
+
+def _followed(clock: SenderClock, sample: Stamped) -> SenderClock:
+    return clock.followed(sample.stamp_s, sample.arrival_s, stamped=sample.stamped)
 
 
 class InputGate:

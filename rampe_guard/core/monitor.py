@@ -81,8 +81,8 @@ class ObjectHealth:
 class Health:
     """Status with its reasons, and the age of the newest good sample of each input [s].
 
-    The age counts from its arrival, and to that how far its stamp lagged behind the other
-    input's.
+    The age counts from its arrival, and to that how late it came: how far its stamp lagged behind
+    the other input's, or behind its own sender's clock.
 
     ``starting``: not monitoring only because the first samples may still be on their way.
     ``off``: not monitoring only because the machine is switched off.
@@ -134,6 +134,7 @@ class InputMonitor:
         self._last_s: dict[InputName, float | None] = {"joystick": None, "actuators": None}
         self._stamps: dict[InputName, tuple[float, float]] = {}
         self._lag_s: dict[InputName, float] = {}
+        self._late_s: dict[InputName, float] = {}
         self._accepted: Counter[InputName] = Counter()
         self._rejected: Counter[tuple[InputName, str]] = Counter()
         self._recent: dict[tuple[InputName, str], float] = {}
@@ -146,15 +147,28 @@ class InputMonitor:
         self._faulty: list[str] = []
         self._distrust: str | None = None
 
-    def accept(self, name: InputName, arrival_s: float, stamp_s: float | None = None) -> None:
-        """A good sample arrived; its own stamp, if it had one, tells how late."""
+    def accept(
+        self,
+        name: InputName,
+        arrival_s: float,
+        stamp_s: float | None = None,
+        late_s: float = 0.0,
+    ) -> None:
+        """A good sample arrived; its own stamp, if it had one, tells how late.
+
+        Args:
+            name: of what.
+            arrival_s: when it came [s].
+            stamp_s: its own stamp, if it had one [s].
+            late_s: how long it was under way, by its own sender's clock [s].
+        """
         self._accepted[name] += 1
         self._in_a_row[name] = 0
         if name == "enabled":  # which says nothing of where the machine is
             return
         self._last_s[name] = arrival_s
         self._note(arrival_s, good=True)
-        self._lag_s[name] = 0.0
+        self._lag_s[name], self._late_s[name] = 0.0, late_s
         self._stamps.pop(name, None)
         if stamp_s is not None:
             self._stamps[name] = stamp_s, arrival_s
@@ -241,7 +255,7 @@ class InputMonitor:
         off: bool = False,
     ) -> Health:
         ages: dict[InputName, float | None] = {
-            name: None if last is None else max(now_s - last, 0.0) + self._lag_s[name]
+            name: None if last is None else max(now_s - last, 0.0) + self._under_way_s(name)
             for name, last in self._last_s.items()
         }
         counts = dict(self._accepted), dict(self._rejected)
@@ -287,15 +301,24 @@ class InputMonitor:
 
     def _late(self, name: InputName, since_s: float) -> Reason | None:
         """Messages keep coming, but they tell of long ago."""
-        lag_s = self._lag_s.get(name, 0.0)
-        if since_s + lag_s <= self._limit_s(name):
+        if since_s + self._under_way_s(name) <= self._limit_s(name):
             return None
+        lag_s, late_s = self._lag_s.get(name, 0.0), self._late_s.get(name, 0.0)
+        if late_s > lag_s:
+            text = (
+                f"{name} messages come {late_s:.1f} s late by their stamps: kept on their way,"
+                " or by a clock that runs slow?"
+            )
+            return Reason(f"{name}_late", name, text)
         other = "joystick" if name == "actuators" else "actuators"
         text = (
             f"{name} messages lag {lag_s:.1f} s behind the {other} by their stamps:"
             " do both come from one clock?"
         )
         return Reason(f"{name}_late", name, text)
+
+    def _under_way_s(self, name: InputName) -> float:
+        return max(self._lag_s.get(name, 0.0), self._late_s.get(name, 0.0))
 
     def _limit_s(self, name: InputName) -> float:
         config = self._config

@@ -118,3 +118,78 @@ def test_an_arm_cannot_jump_over_a_gap_either() -> None:
     assert isinstance(result, Rejection)
     assert result.reason == "position_jump"
     assert isinstance(g.actuators(arm(1.9, 0.5, 0.3)), Accepted)
+
+
+AHEAD_S = 1.7e9
+
+
+def fed(judge: InputGate, stamps: list[float], arrivals: list[float]) -> list[float | str]:
+    """How late each sample was [s], or why it was refused."""
+    told: list[float | str] = []
+    for stamp, arrival in zip(stamps, arrivals, strict=True):
+        result = judge.joystick(lever(AHEAD_S + stamp, 0.0, 0.0, arrival=arrival))
+        told.append(result.reason if isinstance(result, Rejection) else round(result.late_s, 2))
+    return told
+
+
+def prompt(judge: InputGate, until_s: float = 2.0) -> None:
+    times = np.arange(1.0, until_s, 0.01).tolist()
+    assert set(fed(judge, times, times)) == {0.0}
+
+
+def test_what_a_network_kept_is_late_and_the_last_of_it_is_not() -> None:
+    judge = gate()
+    prompt(judge)
+    # of five seconds the first two messages were kept, and the last two
+    kept = [2.0, 2.01, 6.98, 6.99]
+    assert fed(judge, kept, [7.0] * 4) == pytest.approx([5.0, 4.99, 0.02, 0.01], abs=0.02)
+    assert fed(judge, [7.01], [7.01]) == [0.0]
+
+
+def test_what_only_keeps_coming_late_stays_late() -> None:
+    judge = gate()
+    prompt(judge)
+    arrivals = np.arange(4.0, 64.0, 0.01)
+    told = fed(judge, (arrivals - 2.0).tolist(), arrivals.tolist())
+    assert told[0] == 2.0
+    assert isinstance(told[-1], float)
+    assert 1.9 < told[-1] < 2.0
+
+
+def test_a_stamp_beyond_its_own_clock_is_refused_though_the_last_was_late() -> None:
+    judge = gate()
+    prompt(judge)
+    late_s, refused = fed(judge, [2.0, 9.5], [7.0, 7.0])
+    assert late_s == pytest.approx(5.0, abs=0.02)
+    assert refused == "stamp_jump"
+
+
+def test_a_clock_that_was_set_back_a_little_is_waited_for_and_gone_by() -> None:
+    judge = gate()
+    prompt(judge)
+    arrivals = np.arange(2.0, 3.0, 0.01)
+    told = fed(judge, (arrivals - 0.3).tolist(), arrivals.tolist())
+    assert told[:29] == ["stamp_back"] * 29
+    assert set(told[31:]) == {0.0}
+
+
+def test_one_out_of_order_is_no_other_clock() -> None:
+    judge = gate()
+    prompt(judge)
+    assert fed(judge, [1.5, 2.0], [3.0, 3.0]) == ["stamp_back", 1.0]
+
+
+def test_a_clock_that_loses_half_a_millisecond_a_second_makes_nothing_late() -> None:
+    judge = gate()
+    arrivals = np.arange(1.0, 2000.0, 0.05)
+    told = fed(judge, (arrivals * (1.0 - 5e-4)).tolist(), arrivals.tolist())
+    assert set(told) == {0.0}
+
+
+def test_who_started_anew_brings_a_clock_of_his_own() -> None:
+    judge = gate()
+    prompt(judge)
+    arrivals = np.arange(3.0, 4.0, 0.01)
+    told = fed(judge, (arrivals - 3600.0).tolist(), arrivals.tolist())
+    assert told[0] == "stamp_back"
+    assert told[-1] == 0.0

@@ -235,3 +235,17 @@ def test_what_was_lost_to_a_flood_says_nothing_of_the_columns() -> None:
     monitor.accept("joystick", 8.0)
     monitor.accept("actuators", 8.0)
     assert monitor.health(8.0).status is Status.OK  # and it is over when it is over
+
+
+def test_both_inputs_may_be_late_alike() -> None:
+    """A network that stood still hands on what it kept of both: no lag between them tells it."""
+    monitor = streams({})
+    for name in ("joystick", "actuators"):
+        monitor.accept(name, 110.0, 5102.0, late_s=8.0)
+    health = monitor.health(110.0)
+    assert [reason.code for reason in health.reasons] == ["actuators_late", "joystick_late"]
+    assert "8.0 s late by their stamps" in health.reasons[0].text
+    assert health.ages_s["actuators"] == pytest.approx(8.0)
+    for name in ("joystick", "actuators"):
+        monitor.accept(name, 110.01, 5110.01, late_s=0.0)  # type: ignore[arg-type]
+    assert monitor.health(110.01).status is Status.OK
