@@ -1,6 +1,6 @@
-"""What the reference takes from the code: ``<!-- generated: NAME -->`` in a page becomes Markdown.
+"""What pages take from elsewhere: ``<!-- generated: NAME -->`` in a page becomes Markdown.
 
-Nothing of it is kept in the repository, so nothing of it can be out of date.
+Most is made from the code. Nothing of it is kept twice, so nothing of it can be out of date.
 """
 
 from __future__ import annotations
@@ -21,11 +21,21 @@ from rampe_guard.cli import _parser
 from rampe_guard.settings.schema import scene_schema, site_schema
 
 _MARK: Final = re.compile(r"^<!-- generated: ([a-z]+) -->$", re.MULTILINE)
-_CONTRACT: Final = Path(__file__).resolve().parents[3] / "config" / "contract"
+_ROOT: Final = Path(__file__).resolve().parents[3]
+_CONTRACT: Final = _ROOT / "config" / "contract"
+_FAULTS: Final = re.compile(r"^<!-- faults -->\n(.*?)^<!-- end -->$", re.MULTILINE | re.DOTALL)
 
 
 def _settings(prefix: str, schema: Callable[[], docs_schema.Schema]) -> Callable[[], str]:
     return lambda: docs_schema.markdown(schema(), prefix=prefix, level=2, left_out="default")
+
+
+def _faults() -> str:
+    """The table of the README, which is the only one."""
+    found = _FAULTS.search((_ROOT / "README.md").read_text("utf-8"))
+    if found is None:
+        raise SphinxError("README.md: no table of faults between its marks")
+    return found[1]
 
 
 MADE: Final[dict[str, Callable[[], str]]] = {
@@ -35,6 +45,7 @@ MADE: Final[dict[str, Callable[[], str]]] = {
     "keys": docs_contract.keys,
     "messages": lambda: docs_contract.messages(_CONTRACT),
     "metrics": docs_metrics.markdown,
+    "faults": _faults,
 }
 
 
