@@ -212,6 +212,7 @@ class InputConfig:
         position_slack: how far a position may lie beyond its limits [share of the range].
         speed_slack: how many times ``max_velocity`` a measured speed may be [-].
         max_stamp_jump_s: largest step of a stamp beyond the time that really passed [s].
+        max_clock_loss: how much stamps may lose on the true time before messages are late [s/s].
         enabled_timeout_s: how long the machine's word that it is switched off holds [s]; None
             if it has no key to say so.
         max_rate_hz: messages of each input that are looked at in the long run [1/s].
@@ -223,6 +224,7 @@ class InputConfig:
     position_slack: float = 0.05
     speed_slack: float = 5.0
     max_stamp_jump_s: float = 1.0
+    max_clock_loss: float = 1e-3
     enabled_timeout_s: float | None = None
     max_rate_hz: float = 1000.0
 

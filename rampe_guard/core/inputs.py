@@ -14,7 +14,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 
 from rampe_guard.core.config import ActuatorConfig, InputConfig
-from rampe_guard.core.sender_clock import SenderClock
+from rampe_guard.core.sender_clock import LOSS, SenderClock
 from rampe_guard.core.types import ActuatorSample, FloatArray, InputName, JoystickSample
 
 
@@ -96,14 +96,20 @@ class Continuity(Generic[S]):
         patience_s: how long a sender that started anew is refused [s].
         max_stamp_jump_s: largest step of a stamp beyond the time that really passed [s].
         speed_slack: how many times its top speed an actuator may seem to have.
+        clock_loss: how much the sender's clock may lose on ours [s/s].
     """
 
     def __init__(
-        self, patience_s: float, max_stamp_jump_s: float, speed_slack: float = 1.0
+        self,
+        patience_s: float,
+        max_stamp_jump_s: float,
+        speed_slack: float = 1.0,
+        clock_loss: float = LOSS,
     ) -> None:
         self._patience_s = patience_s
         self._max_stamp_jump_s = max_stamp_jump_s
         self._speed_slack = speed_slack
+        self._clock_loss = clock_loss
         self._good: S | None = None
         self._suspect: S | None = None
         self._suspect_since_s = 0.0
@@ -123,14 +129,14 @@ class Continuity(Generic[S]):
             self._suspect_since_s, self._suspects = sample.arrival_s, 0
             self._suspect_clock = SenderClock()
         self._suspect, self._suspects = sample, self._suspects + 1
-        self._suspect_clock = _followed(self._suspect_clock, sample)
+        self._suspect_clock = self._followed(self._suspect_clock, sample)
         if sample.arrival_s - self._suspect_since_s >= self._patience_s:
             return replace(self._accept(sample, self._suspect_clock), restarted=True)
         return broken
 
     def _accept(self, sample: S, clock: SenderClock) -> Accepted[S]:
         self._good, self._suspect, self._suspects = sample, None, 0
-        self._clock = _followed(clock, sample)
+        self._clock = self._followed(clock, sample)
         if not sample.stamped:
             return Accepted(sample)
         measured_s = self._clock.measured_s(sample.stamp_s, sample.arrival_s)
@@ -158,9 +164,10 @@ class Continuity(Generic[S]):
             return Fault("position_jump", f"actuator {j} moved {moved[j]:.4g} in {step:.3g} s")
         return None
 
-
-def _followed(clock: SenderClock, sample: Stamped) -> SenderClock:
-    return clock.followed(sample.stamp_s, sample.arrival_s, stamped=sample.stamped)
+    def _followed(self, clock: SenderClock, sample: S) -> SenderClock:
+        return clock.followed(
+            sample.stamp_s, sample.arrival_s, stamped=sample.stamped, loss=self._clock_loss
+        )
 
 
 class InputGate:
@@ -188,9 +195,11 @@ class InputGate:
         self._low = limits[:, 0] - config.position_slack * width
         self._high = limits[:, 1] + config.position_slack * width
         jump_s = config.max_stamp_jump_s
-        self._joystick = Continuity[JoystickSample](config.joystick_timeout_s, jump_s)
+        self._joystick = Continuity[JoystickSample](
+            config.joystick_timeout_s, jump_s, clock_loss=config.max_clock_loss
+        )
         self._actuators = Continuity[ActuatorSample](
-            config.actuators_timeout_s, jump_s, config.speed_slack
+            config.actuators_timeout_s, jump_s, config.speed_slack, config.max_clock_loss
         )
 
     def joystick(self, sample: JoystickSample) -> Accepted[JoystickSample] | Rejection:

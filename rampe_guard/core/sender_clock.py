@@ -11,9 +11,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-_DRIFT = 1e-3
-"""How much the distance may shrink by [s/s]: clocks run apart by far less, and one position
-that came without delay is not held against the later ones for ever."""
+LOSS = 1e-3
+"""How much a sender's clock may lose on ours [s/s]: real ones run apart by far less, and one
+position that came without delay is not held against the later ones for ever."""
 _SPREAD_S = 0.3
 """What comes on a shorter way than the machine's positions looks that much ahead of them: ways that
 differ by more are not to be told from clocks that differ [s]."""
@@ -31,13 +31,22 @@ class SenderClock:
     ahead_s: float | None = None
     at_s: float = 0.0
 
-    def followed(self, stamp_s: float, arrival_s: float, *, stamped: bool = True) -> SenderClock:
-        """The same after an accepted message; without a stamp of its own that tells nothing."""
+    def followed(
+        self, stamp_s: float, arrival_s: float, *, stamped: bool = True, loss: float = LOSS
+    ) -> SenderClock:
+        """The same after an accepted message; without a stamp of its own that tells nothing.
+
+        Args:
+            stamp_s: its stamp [s].
+            arrival_s: when it came [s].
+            stamped: it has one.
+            loss: how much the sender's clock may lose on ours [s/s].
+        """
         if not stamped:
             return self
         ahead_s = stamp_s - arrival_s
         if self.ahead_s is not None:
-            ahead_s = max(ahead_s, self.ahead_s - _DRIFT * (arrival_s - self.at_s))
+            ahead_s = max(ahead_s, self.ahead_s - loss * (arrival_s - self.at_s))
         return SenderClock(ahead_s, arrival_s)
 
     def measured_s(self, stamp_s: float, arrival_s: float) -> float:
@@ -55,5 +64,5 @@ class SenderClock:
             return None
         early_s = other.ahead_s - self.ahead_s
         # while the machine is silent its clock runs on, and may run away from ours
-        allowed_s = _SPREAD_S + _DRIFT * max(other.at_s - self.at_s, 0.0)
+        allowed_s = _SPREAD_S + LOSS * max(other.at_s - self.at_s, 0.0)
         return early_s if early_s > allowed_s else None

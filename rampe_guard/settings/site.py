@@ -239,6 +239,7 @@ def _guard(model: SiteModel) -> GuardConfig:
             position_slack=inputs.position_slack,
             speed_slack=inputs.speed_slack,
             max_stamp_jump_s=inputs.max_stamp_jump_s,
+            max_clock_loss=inputs.max_clock_loss,
             enabled_timeout_s=None if model.keys.enabled is None else inputs.enabled.timeout_s,
             max_rate_hz=inputs.max_rate_hz,
         ),

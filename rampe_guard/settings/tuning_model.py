@@ -314,6 +314,11 @@ class InputsModel(Model):
         default=_INPUTS.max_stamp_jump_s,
         description="The largest step of a stamp beyond the time that really passed [s].",
     )
+    max_clock_loss: Annotated[float, Field(gt=0.0, le=1.0)] = Field(
+        default=_INPUTS.max_clock_loss,
+        description="The time that stamps may lose on the true time before their messages count "
+        "as late [s/s]; 1 for a simulation that may run slower than real time.",
+    )
     max_rate_hz: Annotated[float, Field(ge=10.0, le=100_000.0)] = Field(
         default=_INPUTS.max_rate_hz,
         description="The messages of each input that are looked at [1/s]; of more, the newest "

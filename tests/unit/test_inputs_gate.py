@@ -186,6 +186,15 @@ def test_a_clock_that_loses_half_a_millisecond_a_second_makes_nothing_late() -> 
     assert set(told) == {0.0}
 
 
+def test_a_simulation_may_run_at_half_the_pace_where_the_site_says_so() -> None:
+    arrivals = np.arange(1.0, 20.0, 0.05)
+    stamps = (0.5 * arrivals).tolist()
+    usual = fed(gate(), stamps, arrivals.tolist())
+    assert usual[-1] == pytest.approx(9.5, abs=0.1)
+    slow = InputGate(ACTUATORS, LIMITS, InputConfig(max_clock_loss=1.0), axes=2)
+    assert set(fed(slow, stamps, arrivals.tolist())) == {0.0}
+
+
 def test_who_started_anew_brings_a_clock_of_his_own() -> None:
     judge = gate()
     prompt(judge)
