@@ -220,7 +220,8 @@ def add_replay(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("log", help="recording (MCAP), or a CSV file as the site file's 'log' says")
     add_connect(parser)
     parser.add_argument("--live", action="store_true", help="publish its inputs onto Zenoh instead")
-    parser.add_argument("--speed", type=positive, default=1.0, help="with --live (default 1; slower needs inputs.max_clock_loss)")
+    speed = "with --live (default 1; slower needs inputs.max_clock_loss)"
+    parser.add_argument("--speed", type=positive, default=1.0, help=speed)
     parser.add_argument("--repeats", action="store_true", help="also print repeats of alerts")
     parser.add_argument(
         "--compare", action="store_true", help="with the alerts that were given live, on stderr"
