@@ -137,7 +137,8 @@ def alert_from(
 
 def ended(alert: Alert, received_s: float) -> Alert:
     """The clear of an alert that is known to be over though its own clear never came."""
-    text = wire.alert_text(alert.link, alert.zone, None, "clear", alert.source)
+    in_margin = (alert.clearance_now_m or 0.0) < 0.0
+    text = wire.alert_text(alert.link, alert.zone, None, "clear", alert.source, in_margin=in_margin)
     return structs.replace(
         alert,
         level="clear",

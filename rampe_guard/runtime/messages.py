@@ -91,6 +91,7 @@ class Scribe:
                 event.level.word,
                 found.source,
                 machine_off=event.inhibit is Inhibit.MACHINE_OFF,
+                in_margin=sweep is not None and (sweep.clearance_now_m or 0.0) < 0.0,
                 times=times,
             ),
         )

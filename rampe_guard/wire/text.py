@@ -22,6 +22,7 @@ def alert_text(
     source: str = "intent",
     *,
     machine_off: bool = False,
+    in_margin: bool = False,
     times: tuple[int, int] | None = None,
 ) -> str:
     """Text such as ``bucket → cab-wall in 1.4 s``.
@@ -33,6 +34,7 @@ def alert_text(
         level: "clear", "caution", "warning" or "imminent".
         source: of the alert.
         machine_off: it is suppressed, since the machine is switched off.
+        in_margin: the link is within the zone's margin, which is no alarm while it does not near.
         times: how many of how many similar situations touched; None where memory does not speak.
     """
     link, zone = _line(link or "arm"), _line(zone or "obstacle")
@@ -40,6 +42,8 @@ def alert_text(
         return _system(zone, level, machine_off=machine_off)
     if machine_off:
         return _pair(link, _ARROW, zone, ": machine off")
+    if level == "clear" and in_margin:
+        return _pair(link, " in margin of ", zone, ", not nearing")
     if level == "clear":
         return _pair(link, " clear of ", zone, " now")
     if source == "contact":

@@ -160,17 +160,23 @@ names = st.text("abcxyz-_09éß…→挖斗壁\U0001f6a7", min_size=1, max_size=
     level=st.sampled_from(["clear", "caution", "warning", "imminent"]),
     source=st.sampled_from(["stopping", "intent", "next", "contact"]),
     off=st.booleans(),
+    inside=st.booleans(),
 )
 def test_text_always_names_link_zone_and_time(
-    link: str, zone: str, time_s: float | None, level: str, source: str, *, off: bool
+    link: str, zone: str, time_s: float | None, level: str, source: str, *, off: bool, inside: bool
 ) -> None:
-    text = alert_text(link, zone, time_s, level, source, machine_off=off)
+    text = alert_text(link, zone, time_s, level, source, machine_off=off, in_margin=inside)
     width = sum(2 if unicodedata.east_asian_width(letter) in "WF" else 1 for letter in text)
     assert max(len(text), width) <= MAX_TEXT
     rest = _without(text, link)
-    between = next(word for word in (" → ", " at ", " clear of ") if rest.startswith(word))
+    between = next(
+        word for word in (" → ", " at ", " clear of ", " in margin of ") if rest.startswith(word)
+    )
     when = _without(rest.removeprefix(between), zone)
-    assert re.fullmatch(r" now| in [0-9]+\.[0-9] s| in >99 s|, time unknown|: machine off", when)
+    assert re.fullmatch(
+        r" now| in [0-9]+\.[0-9] s| in >99 s|, time unknown|: machine off|, not nearing", when
+    )
+    assert not (inside and " clear of " in text)
 
 
 def _without(text: str, name: str) -> str:

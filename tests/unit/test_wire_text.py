@@ -48,6 +48,14 @@ def test_a_suppressed_alert_never_reads_as_clear() -> None:
     assert text == "machine off: not monitoring"
 
 
+def test_who_is_within_a_margin_is_not_clear_of_it() -> None:
+    text = alert_text("bucket", "cab-wall", None, "clear", "contact", in_margin=True)
+    assert text == "bucket in margin of cab-wall, not nearing"
+    assert alert_text("bucket", "wall", 0.0, "imminent", "contact", in_margin=True) == (
+        "bucket at wall now"
+    )
+
+
 def test_wide_letters_take_two_cells_of_the_display() -> None:
     text = alert_text("挖斗" * 20, "壁" * 40, 1.4)
     assert text == "挖斗" * 5 + "挖… → " + "壁" * 12 + "… in 1.4 s"
