@@ -12,7 +12,7 @@ from rampe_guard.core.identify_signals import Traces
 from rampe_guard.core.inputs import AXIS_SLACK
 from rampe_guard.errors import LogError
 from rampe_guard.programs.measuring import Heard
-from rampe_guard.runtime.csv_log import mapped_rows
+from rampe_guard.runtime.csv_rows import mapped_rows
 from rampe_guard.settings import ColumnMap
 
 _AXIS_MOST = 1.0 + AXIS_SLACK

@@ -7,8 +7,6 @@ learning from it would be worse than no log.
 
 from __future__ import annotations
 
-import csv
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,13 +16,13 @@ import numpy as np
 from rampe_guard.core.inputs import AXIS_SLACK
 from rampe_guard.core.types import ActuatorSample, FloatArray, Inputs, JoystickSample
 from rampe_guard.errors import LogError
+from rampe_guard.runtime.csv_rows import mapped_rows, time_problems
 from rampe_guard.runtime.replay import idle_times
 from rampe_guard.settings import ColumnMap, Site
 
 _WRONG_SHARE = 0.02
 """More impossible rows than this in one column is no glitch."""
 _AXIS_LIMIT = 1.0 + AXIS_SLACK
-_FASTEST_S, _SLOWEST_S = 0.0005, 1.0
 _CLEAR_COMMAND = 0.4
 _AGAINST_SHARE = 0.6
 
@@ -109,54 +107,11 @@ def read_csv_log(site: Site, path: str | Path, limits: FloatArray) -> CsvLog:
     return log
 
 
-def mapped_rows(path: Path, columns: list[ColumnMap]) -> tuple[FloatArray, list[str]]:
-    """Mapped values (k, columns) of every whole row, and a warning for every other.
-
-    Raises:
-        LogError: it cannot be read, a column is missing, or no row is whole.
-    """
-    rows, warnings = [], []
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            reader = csv.DictReader(file)
-            header = reader.fieldnames or []
-            missing = [c.column for c in columns if c.column not in header]
-            if missing:
-                raise LogError(
-                    f"{path}:1: no column {missing[0]!r}; the header has {', '.join(header)}"
-                )
-            for row in reader:
-                values, problem = _mapped(row, columns)
-                if problem:
-                    warnings.append(f"{path}:{reader.line_num}: row left out: {problem}")
-                else:
-                    rows.append(values)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise LogError(f"{path}: cannot be read: {error}") from None
-    if not rows:
-        raise LogError(f"{path}: no usable row{'; ' + warnings[0] if warnings else ''}")
-    return np.array(rows), warnings
-
-
-def _mapped(row: dict[str, str | None], columns: list[ColumnMap]) -> tuple[list[float], str]:
-    """Mapped values of one row, and what is wrong with it (empty if nothing)."""
-    missing = [c.column for c in columns if row[c.column] is None]
-    if missing:
-        return [], f"cut off before column {missing[0]!r}"
-    try:
-        values = [float(row[c.column] or "") * c.scale + c.offset for c in columns]
-    except ValueError as error:
-        return [], str(error)
-    if not all(map(math.isfinite, values)):
-        return [], "a value is not finite"
-    return values, ""
-
-
 def _check(site: Site, log: CsvLog, limits: FloatArray) -> None:
     mapping = site.log
     if mapping is None:
         return
-    problems = _time_problems(mapping.time, log.time_s)
+    problems = time_problems(mapping.time, log.time_s)
     slack = site.guard.inputs.position_slack
     for j, actuator in enumerate(site.guard.actuators):
         name = actuator.name
@@ -174,28 +129,6 @@ def _check(site: Site, log: CsvLog, limits: FloatArray) -> None:
             f"{log.path}: this cannot be what the site file's 'log' says:\n  {text}\n"
             f"  Are columns swapped, or is a scale wrong? Nothing was learned from it."
         )
-
-
-def _time_problems(column: ColumnMap, time_s: FloatArray) -> list[str]:
-    steps = np.diff(time_s)
-    back = np.flatnonzero(steps <= 0.0)
-    if back.size:
-        at = int(back[0])
-        return [
-            (
-                f"column {column.column!r}: time does not go on after {time_s[at]:.6g} s"
-                f" (row {at + 2} of the usable ones): two runs in one file? Split it"
-            )
-        ]
-    typical = float(np.median(steps)) if steps.size else _SLOWEST_S
-    if not _FASTEST_S <= typical <= _SLOWEST_S:
-        return [
-            (
-                f"column {column.column!r}: rows are {typical:.3g} s apart: is time in seconds?"
-                " Give its scale"
-            )
-        ]
-    return []
 
 
 def _outside(
