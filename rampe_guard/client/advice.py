@@ -7,7 +7,8 @@
     command = shaper.shape(command, now_s)  # at every turn of the control loop
 
 No clock, no network: time is passed in, on the clock with which the machine stamps its positions:
-advice is as old as the position that it is about, however long it was under way.
+advice is as old as the position that it is about, however long it was under way. What cannot be
+(a stamp from the future, a time that goes back, a command that is no number) frees no lever.
 """
 
 from __future__ import annotations
@@ -18,6 +19,11 @@ import numpy as np
 
 from rampe_guard import wire
 from rampe_guard.core.types import FloatArray
+
+LONGEST_S = 2.0
+"""No advice is followed for longer [s], whatever it says: no site file allows more."""
+_AHEAD_S = 0.1
+"""Stamps are the machine's own: none can be further ahead of its clock [s]."""
 
 
 class CommandShaper:
@@ -36,7 +42,7 @@ class CommandShaper:
             raise ValueError(f"without={without} must be from 0 to 1")
         self._names, self._without = tuple(actuators), without
         self._most: FloatArray | None = None
-        self._until_s = float("-inf")
+        self._until_s = self._now_s = float("-inf")
         self._order: tuple[str, int] = ("", 0)
 
     def take(self, payload: bytes, now_s: float) -> wire.Advice:
@@ -55,19 +61,40 @@ class CommandShaper:
             return advice
         self._order = advice.boot_id, advice.seq
         self._most = self._shares(advice)
-        about_s = now_s if advice.stamp is None else min(advice.stamp, now_s)
-        self._until_s = about_s + advice.expires_after_s
+        about_s = now_s if advice.stamp is None else advice.stamp
+        possible = about_s <= now_s + _AHEAD_S  # and a number, both
+        holds_s = min(advice.expires_after_s, LONGEST_S)
+        self._until_s = min(about_s, now_s) + holds_s if possible else float("-inf")
+        self._now_s = now_s
         return advice
 
     def advised(self, now_s: float) -> bool:
         """Whether there is advice that may be followed."""
-        return self._most is not None and now_s <= self._until_s
+        return self._fresh(now_s) is not None
 
     def shape(self, command: FloatArray, now_s: float) -> FloatArray:
-        """The command (n,) in [-1, 1] along the actuators, no larger than advised."""
-        if self._most is None or now_s > self._until_s:
+        """The command (n,) in [-1, 1] along the actuators, no larger than advised.
+
+        What is no number in it becomes 0.
+
+        Raises:
+            ValueError: it is not one number for each actuator.
+        """
+        command = np.asarray(command, dtype=float)
+        if command.shape != (len(self._names),):
+            raise ValueError(f"command {command.shape}: {len(self._names)} actuators advised")
+        command = np.nan_to_num(command, nan=0.0)
+        most = self._fresh(now_s)
+        if most is None:
             return np.clip(command, -self._without, self._without)
-        return np.clip(command, -self._most[:, 0], self._most[:, 1])
+        return np.clip(command, -most[:, 0], most[:, 1])
+
+    def _fresh(self, now_s: float) -> FloatArray | None:
+        """Shares that hold now; time does not go back, so what was too old stays so."""
+        if not now_s >= self._now_s:  # nor when it is no number
+            now_s = self._now_s if np.isfinite(now_s) else np.inf
+        self._now_s = now_s
+        return self._most if now_s <= self._until_s else None
 
     def _shares(self, advice: wire.Advice) -> FloatArray | None:
         told = advice.actuators

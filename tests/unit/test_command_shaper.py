@@ -8,7 +8,14 @@ from rampe_guard.errors import MessageError
 FULL = np.array([1.0, -1.0])
 
 
-def told(seq: int = 1, stamp: float | None = 10.0, boot: str = "a", *, some: bool = True) -> bytes:
+def told(
+    seq: int = 1,
+    stamp: float | None = 10.0,
+    boot: str = "a",
+    *,
+    some: bool = True,
+    expires_s: float = 0.25,
+) -> bytes:
     lever = wire.ActuatorAdvice(
         negative_share=0.5, positive_share=0.25, negative_zone="x", positive_zone="y"
     )
@@ -23,7 +30,7 @@ def told(seq: int = 1, stamp: float | None = 10.0, boot: str = "a", *, some: boo
             reason=None if some else "blind",
             stamp=stamp,
             published_unix_s=0.0,
-            expires_after_s=0.25,
+            expires_after_s=expires_s,
             text="",
         )
     )
@@ -90,3 +97,36 @@ def test_rubbish_changes_nothing(shaper: CommandShaper) -> None:
 def test_a_share_is_a_share() -> None:
     with pytest.raises(ValueError, match="without=2"):
         CommandShaper((), 2.0)
+
+
+@pytest.mark.parametrize("command", [[np.nan, 1.0], [np.inf, 1.0], [1e300, 1.0]])
+def test_what_is_no_number_moves_nothing(shaper: CommandShaper, command: list[float]) -> None:
+    shaper.take(told(), 10.0)
+    shaped = shaper.shape(np.array(command), 10.0)
+    assert shaped.tolist() == [0.0 if np.isnan(command[0]) else 0.25, 0.25]
+
+
+def test_a_command_for_another_number_of_actuators_is_an_error(shaper: CommandShaper) -> None:
+    shaper.take(told(), 10.0)
+    with pytest.raises(ValueError, match="2 actuators"):
+        shaper.shape(np.array([1.0]), 10.0)
+
+
+def test_time_that_goes_back_or_is_none_makes_no_advice_young(shaper: CommandShaper) -> None:
+    shaper.take(told(), 10.0)
+    assert not shaper.advised(10.3)
+    assert not shaper.advised(10.1)
+    shaper.take(told(2), 10.0)  # its clock was set, and it is told anew
+    assert shaper.advised(10.1)
+    assert not shaper.advised(float("nan"))
+    assert shaper.shape(FULL, 10.1).tolist() == [0.0, 0.0]
+
+
+def test_no_advice_holds_for_ever_nor_comes_from_the_future(shaper: CommandShaper) -> None:
+    shaper.take(told(expires_s=1e9), 10.0)
+    assert shaper.advised(12.0)
+    assert not shaper.advised(12.1)
+    shaper.take(told(2, stamp=1e9), 12.1)
+    assert not shaper.advised(12.1)
+    shaper.take(told(3, stamp=13.0), float("nan"))
+    assert not shaper.advised(13.0)
