@@ -14,8 +14,8 @@ from rich.text import Text
 from rampe_guard.assembly import Machine
 from rampe_guard.core.scene import ActuatorLimit, SceneObject
 from rampe_guard.core.types import FloatArray, ZoneSweep
-from rampe_guard.programs.checkup_gaps import gaps
-from rampe_guard.programs.checkup_live import Live, live_check
+from rampe_guard.programs.checkup_gaps import gaps, suspects
+from rampe_guard.programs.checkup_live import Findings, Live, live_check
 from rampe_guard.programs.checkup_reach import Reach, reaches
 from rampe_guard.programs.ros2_tools import topics
 from rampe_guard.runtime.loading import load_telling
@@ -29,6 +29,9 @@ def checkup(
     site_path: str, console: Console, picture: str | None = None, live: Live | None = None
 ) -> int:
     """Load everything a guard would load and print what it is; 0 when all of it is usable.
+
+    What may be meant but is mostly a mistake begins with "look:" and is counted in the last line,
+    so that nobody reads only "ok".
 
     Args:
         site_path: the site file.
@@ -51,18 +54,46 @@ def checkup(
         console.print()
         console.print(table)
     console.print()
-    for remark in (*gaps(machine, reach), *heard):
+    for remark in gaps(machine):
         console.print(Text(f"note: {remark}", "yellow"))
+    looks = [*suspects(machine, reach), *heard]
+    for remark in looks:
+        console.print(Text(f"look: {remark}", "bold yellow"))
     if picture is not None:
         from rampe_guard.programs.checkup_picture import draw  # noqa: PLC0415 - it takes a second
 
         draw(machine, pose, picture)
         console.print(f"picture: {picture}", highlight=False)
-    if live is not None and not live_check(site, machine.arm.limits, live, console):
-        console.print(Text("not ok: without these inputs nothing can be guarded", "bold red"))
-        return 2
-    console.print(Text("ok: this site can be guarded", "bold"))
-    return 0
+    found = Findings()
+    if live is not None:
+        found = live_check(site, machine.arm.limits, live, console)
+    code, words = verdict(len(looks), found)
+    console.print(Text(words, "bold red" if code else "bold"))
+    return code
+
+
+def verdict(looks: int, found: Findings) -> tuple[int, str]:
+    """The exit code, and the last words: the only ones that are read by many.
+
+    Args:
+        looks: lines on the files that begin with "look:".
+        found: what was heard of the machine.
+    """
+    if found.deaf:
+        return 2, "not ok: without these inputs nothing can be guarded"
+    if found.wrong:
+        lines = _count(len(found.wrong))
+        return 2, f"not ok: machine and site file contradict each other: mend {lines} wrong:"
+    looks += len(found.looks)
+    if looks:
+        return 0, f"ok: this site can be guarded, but look at {_count(looks)} look:"
+    return 0, "ok: this site can be guarded"
+
+
+def _count(lines: int) -> str:
+    if lines == 1:
+        return "the line above that begins with"
+    return f"the {lines} lines above that begin with"
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""What a guard of a site does not protect, and why: said by `check`, in sentences."""
+"""What a guard of a site does not protect, and what is mostly a mistake: `check`'s sentences."""
 
 from __future__ import annotations
 
@@ -11,9 +11,14 @@ from rampe_guard.core.scene import ActuatorLimit, Mesh
 from rampe_guard.programs.checkup_reach import POSTURES, Reach
 
 
-def gaps(machine: Machine, reach: Mapping[str, Reach]) -> list[str]:
-    """What is not protected, or will be alarmed without end, a sentence each."""
-    return [*_arm(machine), *_zones(machine, reach), *_site(machine)]
+def gaps(machine: Machine) -> list[str]:
+    """What is not protected, a sentence each."""
+    return [*_arm(machine), *_zones(machine), *_site(machine)]
+
+
+def suspects(machine: Machine, reach: Mapping[str, Reach]) -> list[str]:
+    """What is legal and yet mostly a mistake: zones that alarm without end, or never."""
+    return [*_always(reach), *_never(machine)]
 
 
 def _arm(machine: Machine) -> Iterator[str]:
@@ -37,18 +42,26 @@ def _arm(machine: Machine) -> Iterator[str]:
         yield "the arm is not swept against itself (self_collision: {enabled: true})"
 
 
-def _zones(machine: Machine, reach: Mapping[str, Reach]) -> Iterator[str]:
-    shaped = set(machine.arm.link_names) - set(_bare(machine))
+def _zones(machine: Machine) -> Iterator[str]:
+    shaped = _shaped(machine)
     for zone in machine.site.scene.objects:
         if isinstance(zone, ActuatorLimit):
             continue
         ignored = sorted(set(zone.ignore_links) & shaped)
-        if ignored and set(ignored) >= shaped:
-            yield f"zone {zone.name!r} ignores every link: it can never warn"
-        elif ignored:
+        if ignored and set(ignored) < shaped:
             yield f"zone {zone.name!r} does not guard against {', '.join(ignored)}"
         if isinstance(zone, Mesh) and zone.open:
             yield f"zone {zone.name!r} is a surface: what is wholly below it touches nothing"
+
+
+def _never(machine: Machine) -> Iterator[str]:
+    shaped = _shaped(machine)
+    for zone in machine.site.scene.objects:
+        if not isinstance(zone, ActuatorLimit) and shaped and shaped <= set(zone.ignore_links):
+            yield f"zone {zone.name!r} ignores every link: it can never warn"
+
+
+def _always(reach: Mapping[str, Reach]) -> Iterator[str]:
     for one in reach.values():
         if one.always:
             link = one.links.most_common(1)[0][0]
@@ -70,6 +83,10 @@ def _site(machine: Machine) -> Iterator[str]:
     if site.guard.inputs.joystick_on_change:
         yield f"the joystick may be silent while {site.keys.joystick_alive} is there (on_change)"
     yield "a load, a hose or a tool that the URDF does not show is not swept"
+
+
+def _shaped(machine: Machine) -> set[str]:
+    return set(machine.arm.link_names) - set(_bare(machine))
 
 
 def _bare(machine: Machine) -> list[str]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from rich.console import Console
@@ -35,8 +35,25 @@ class Live:
     stop: StopFlag
 
 
-def live_check(site: Site, limits: FloatArray, live: Live, console: Console) -> bool:
-    """Hear all inputs for a while and print what they are like; whether a guard could work.
+@dataclass(slots=True)
+class Findings:
+    """What was heard of a machine, in sentences.
+
+    Attributes:
+        deaf: an input that is needed is missing, or nothing of it can be used.
+        wrong: what contradicts the site file: a guard would take it for what it is not.
+        looks: what a guard can work with, and is mostly a mistake.
+        notes: the rest.
+    """
+
+    deaf: bool = False
+    wrong: list[str] = field(default_factory=list)
+    looks: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+def live_check(site: Site, limits: FloatArray, live: Live, console: Console) -> Findings:
+    """Hear all inputs for a while, print what they are like, and return it.
 
     Args:
         site: as it is loaded.
@@ -63,21 +80,29 @@ def live_check(site: Site, limits: FloatArray, live: Live, console: Console) -> 
     console.print()
     console.print(_table(streams))
     console.print()
-    notes = [*_clocks(streams), *_motion(site, judge.traces())]
-    if alive is False:
-        notes.append(f"nobody holds the token {site.keys.joystick_alive}: the joystick is dead")
+    found = Findings()
+    against_clocks(streams, site, found)
+    against_motion(site, judge.traces(), found)
     words = "works" if guarded else "does not work"
-    notes.append(f"a guard {words} on {site.keys.base} now")
-    for note in notes:
-        console.print(Text(f"note: {note}", "yellow"))
+    found.notes.append(f"a guard {words} on {site.keys.base} now")
     broken = [one for one in streams if one.problem is not None]
-    for one in broken:
-        console.print(Text(f"{one.name}: {one.problem}", "bold red"))
-    skew_s, inputs = _skew_s(_fresh(streams)), site.guard.inputs
-    if abs(skew_s) > min(inputs.joystick_timeout_s, inputs.actuators_timeout_s):
-        console.print(Text("a guard does not accept clocks so far apart", "bold red"))
-        return False
-    return not any(one.needed for one in broken) and alive is not False
+    red = [f"{one.name}: {one.problem}" for one in broken]
+    if alive is False:
+        red.append(f"nobody holds the token {site.keys.joystick_alive}: the joystick is dead")
+    found.deaf = any(one.needed for one in broken) or alive is False
+    _say(found, red, console)
+    return found
+
+
+def _say(found: Findings, red: Sequence[str], console: Console) -> None:
+    for note in found.notes:
+        console.print(Text(f"note: {note}", "yellow"))
+    for look in found.looks:
+        console.print(Text(f"look: {look}", "bold yellow"))
+    for wrong in found.wrong:
+        console.print(Text(f"wrong: {wrong}", "bold red"))
+    for fault in red:
+        console.print(Text(fault, "bold red"))
 
 
 def _wanted(site: Site) -> list[tuple[str, str, float]]:
@@ -129,58 +154,72 @@ def _span(seconds: float) -> str:
     for unit, length in (("h", 3600.0), ("min", 60.0)):
         if size >= 2.0 * length or size == length:
             return f"{size / length:.1f} {unit}"
-    return f"{size:.3g} s"
+    return f"{size:.2g} s"
 
 
-def _skew_s(fresh: dict[str, float]) -> float:
-    """How far the clock of the joystick is ahead of that of the actuators [s]; 0 if unknown."""
-    if "joystick" in fresh and "actuators" in fresh:
-        return fresh["actuators"] - fresh["joystick"]
-    return 0.0
+def against_clocks(streams: Sequence[Stream], site: Site, found: Findings) -> None:
+    """What stamps say of the clocks of their senders.
 
-
-def _clocks(streams: Sequence[Stream]) -> Iterator[str]:
-    """What stamps say of the clocks of their senders."""
+    Where the one clock of all inputs starts is of no account to a guard, so all of them may be as
+    far from this computer's as they like. It is looked at nevertheless: such stamps also come from
+    a sender that replays, or keeps, what is long past.
+    """
     fresh = _fresh(streams)
     for one in streams:
         if one.arrival_s.size and one.name not in fresh:
-            yield f"{one.name}: no stamps: the arrival counts, and delays are not seen"
+            found.notes.append(
+                f"{one.name}: no stamps: the arrival counts, and delays are not seen"
+            )
         ahead_s = fresh.get(one.name, 0.0)
         if abs(ahead_s) > _SKEW_S:
             side = "behind" if ahead_s > 0.0 else "ahead of"
-            yield f"{one.name}: its clock is {_span(ahead_s)} {side} this computer's"
-    if "joystick" in fresh and "actuators" in fresh:
-        skew_s = _skew_s(fresh)
-        if abs(skew_s) > _SKEW_S:
-            yield (
-                f"the clocks of joystick and actuators are {_span(skew_s)} apart: stamp both"
-                " with one clock"
+            found.looks.append(
+                f"{one.name}: its clock is {_span(ahead_s)} {side} this computer's; a guard goes"
+                " by the stamps alone: is this what the machine does now?"
             )
+    if "actuators" not in fresh:  # then a guard compares no stamps
+        return
+    for one in streams:
+        if one.name not in fresh or one.name == "actuators":
+            continue
+        ahead_s = fresh["actuators"] - fresh[one.name]
+        # of levers and positions, those that lag grow old; all else must not come early either
+        most_s = site.guard.inputs.actuators_timeout_s if one.name == "joystick" else _SKEW_S
+        apart = f"the clocks of {one.name} and actuators are {_span(ahead_s)} apart"
+        if not -one.timeout_s <= ahead_s <= most_s:
+            found.wrong.append(f"{apart}, which a guard does not accept: stamp both with one clock")
+        elif abs(ahead_s) > _SKEW_S:
+            found.looks.append(f"{apart}, or one takes so much longer: stamp both with one clock")
         else:
-            yield f"clocks of joystick and actuators: {1e3 * abs(skew_s):.1f} ms apart"
+            ms = 1e3 * abs(ahead_s)
+            found.notes.append(f"clocks of {one.name} and actuators: {ms:.1f} ms apart")
 
 
-def _motion(site: Site, traces: Traces) -> Iterator[str]:
+def against_motion(site: Site, traces: Traces, found: Findings) -> None:
     """What motion says against the site file."""
     measured = identify(traces)
     for actuator, seen in zip(site.guard.actuators, measured, strict=False):
         lever, top = seen.lever, seen.max_velocity
         if lever.axis is not None and lever.axis != actuator.axis:
-            yield (
+            found.wrong.append(
                 f"{actuator.name}: axis {lever.axis} moves it, and the site file says"
                 f" {actuator.axis} ({lever.share:.0%} of the motion explained)"
             )
         elif lever.sign not in (0, actuator.sign):
-            yield (
+            found.wrong.append(
                 f"{actuator.name}: it moves against its lever ({lever.share:.0%} of the motion"
                 f" explained): the site file's sign {actuator.sign} should be {lever.sign}"
             )
+        elif lever.problem and seen.moved:
+            found.notes.append(
+                f"{actuator.name}: its lever is not compared with the site file: {lever.problem}"
+            )
         if top is not None and top.value > _FAST * actuator.max_velocity:
-            yield (
-                f"{actuator.name}: moves at {top.value:.3g} {actuator.unit}/s, and max_velocity is"
-                f" {actuator.max_velocity:g}"
+            found.wrong.append(
+                f"{actuator.name}: moves at {top.value:.3g} {actuator.unit}/s, and the site file's"
+                f" max_velocity is {actuator.max_velocity:g}"
             )
     still = [a.name for a, m in zip(site.guard.actuators, measured, strict=False) if not m.moved]
     if not measured or still:
         names = ", ".join(still or site.actuator_names)
-        yield f"not moved meanwhile, so not compared with the site file: {names}"
+        found.notes.append(f"not moved meanwhile, so not compared with the site file: {names}")

@@ -96,6 +96,8 @@ def test_what_is_wrong_with_a_machine_is_told(place: Place) -> None:
         place.machine.tell(json.dumps({"skew_s": 0.0, "flip": False, "rubbish": False}))
     assert done.returncode == 2, done.stdout + done.stderr  # no guard takes such clocks
     text = " ".join(done.stdout.split())
+    assert "can be guarded" not in text
+    assert "not ok: machine and site file contradict each other" in text
     assert "bad_json" in text
     assert "turn: it moves against its lever" in text
     assert "the site file's sign 1 should be -1" in text
