@@ -16,6 +16,7 @@ import numpy as np
 from rampe_guard.core.types import FloatArray
 from rampe_guard.errors import LogError
 from rampe_guard.settings import ColumnMap
+from rampe_guard.wire.inputs import MAX_VALUE
 
 _ENCODING = "utf-8-sig"
 """With the mark that Excel puts before the first column, or without."""
@@ -39,6 +40,10 @@ def header_of(path: Path) -> list[str]:
 
 def mapped_rows(path: Path, columns: Sequence[ColumnMap]) -> tuple[FloatArray, list[str]]:
     """Mapped values (k, columns) of every whole row, and a warning for every other.
+
+    Args:
+        path: of the file.
+        columns: first that of the time, which alone may be beyond what a message may hold.
 
     Raises:
         LogError: it cannot be read, a column is missing or there twice, or no row is whole.
@@ -144,7 +149,7 @@ def _mapped(
     more = row.get(None) or ()
     if any(map(str.strip, more)):  # a comma at the end of every line is no field
         return [], f"it has {count + len(more)} fields, and the header {count}"
-    values = []
+    values: list[float] = []
     for column in columns:
         text = row[column.column]
         if not isinstance(text, str):
@@ -156,5 +161,7 @@ def _mapped(
             return [], f"column {column.column!r}: {what}"
         if not math.isfinite(value):
             return [], f"column {column.column!r}: {text.strip()[:20]!r} is not finite"
+        if values and abs(value) > MAX_VALUE:
+            return [], f"column {column.column!r}: {value:g} is beyond {MAX_VALUE:g}"
         values.append(value)
     return values, ""

@@ -36,6 +36,7 @@ def test_the_mark_of_excel_is_no_part_of_a_name(tmp_path: Path) -> None:
         ("1,", "column 'a': is empty"),
         ("1,two", "column 'a': 'two' is no number"),
         ("1,inf", "column 'a': 'inf' is not finite"),
+        ("1,1e300", "column 'a': 2e+300 is beyond 1e+06"),
     ],
 )
 def test_a_row_that_is_left_out_is_told_with_line_and_reason(
@@ -69,6 +70,13 @@ def test_what_is_no_log_is_refused_for_what_it_is(tmp_path: Path, text: str, why
     with pytest.raises(LogError) as caught:
         mapped_rows(_file(tmp_path, text), COLUMNS)
     assert why in str(caught.value)
+
+
+def test_a_time_may_be_as_large_as_it_likes(tmp_path: Path) -> None:
+    columns = [ColumnMap("t", scale=1e-9), COLUMNS[1]]
+    rows, warnings = mapped_rows(_file(tmp_path, "t,a\n1800000000500000000,0\n"), columns)
+    assert rows[0, 0] == pytest.approx(1_800_000_000.5)
+    assert warnings == []
 
 
 def test_another_encoding_is_named(tmp_path: Path) -> None:

@@ -168,7 +168,7 @@ def test_joints_must_be_as_many_as_positions(place: Path, tmp_path: Path) -> Non
         (("--time", "turn", *COLUMNS[2:]), "time does not go on"),
         (("--time", "t", "--joystick", "a0:9,a1,a2", *COLUMNS[4:]), "an axis is -1 to 1"),
         (("--time", "t", "--joystick", "a0:x,a1,a2", *COLUMNS[4:]), "is no column; write NAME"),
-        ((), "name the columns: --time t"),
+        ((), "name the columns, in their order, with --joystick and --actuators"),
     ],
 )
 def test_columns_that_cannot_be_are_said(
