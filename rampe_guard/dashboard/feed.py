@@ -85,6 +85,7 @@ class Feed:
         self._answers: deque[tuple[float, wire.State]] = deque(maxlen=_KEPT_ANSWERS)
         self._scene = SceneFollower(site)
         self.undrawable = ""
+        self._failure: BaseException | None = None
         self._thread = threading.Thread(target=self._work, name=f"feed {self._base}", daemon=True)
 
     def start(self) -> None:
@@ -92,7 +93,13 @@ class Feed:
         self._thread.start()
 
     def poll(self, now_s: float) -> Sight:
-        """Take all that arrived; returns the new `sight`."""
+        """Take all that arrived; returns the new `sight`.
+
+        Raises what ended our thread, if anything did: a page that goes on without it would show
+        what is long past.
+        """
+        if self._failure is not None:
+            raise self._failure
         items: list[Item] = []
         other_scene = self._scene.trouble or self.undrawable
         sight = replace(self.sight, now_s=now_s, trouble=self._trouble, other_scene=other_scene)
@@ -147,6 +154,12 @@ class Feed:
     # the thread
 
     def _work(self) -> None:
+        try:
+            self._follow()
+        except BaseException as error:  # noqa: BLE001 - whoever polls gets it, whatever it is
+            self._failure = error
+
+    def _follow(self) -> None:
         bus = Bus.open_retrying(self._site.zenoh, self._stop, self._cannot, self._stop.wait)
         if bus is None:
             return

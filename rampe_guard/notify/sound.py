@@ -104,6 +104,9 @@ class Sound:
                 if self._now() is tone:  # else it was broken off by us
                     self._say("sound failed", f"no sound: {error}")
                     wait_s = _FAILED_S
+            except Exception as error:  # noqa: BLE001 - a terminal that is gone: it may come back
+                self._say("sound failed", f"no sound: {error!r}")
+                wait_s = _FAILED_S
             self._rest(tone, began_s + wait_s)
 
     def _play(self, tone: Tone) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 from rampe_guard.errors import SettingsError
 from rampe_guard.runtime.connecting import connect_to
 from rampe_guard.runtime.stopping import StopFlag
+from rampe_guard.runtime.zenoh_io import check_configuration
 from rampe_guard.settings import Site, load_site
 from rampe_guard.settings.network import is_loopback
 
@@ -66,8 +67,8 @@ def dashboard_sites(
         stop: ends it.
 
     Raises:
-        SettingsError: the extra is not installed, two site files are of one machine, or the token
-            cannot be used.
+        SettingsError: the extra is not installed, two site files are of one machine, or an
+            endpoint or the token cannot be used.
         ConnectionFailedError: the address cannot be listened on.
     """
     sites = [connect_to(load_site(path), endpoints) for path in site_paths]
@@ -84,6 +85,8 @@ def serve(
     """The same for sites already read."""
     need_viser()
     token = place.token()
+    for site in sites:
+        check_configuration(site.zenoh)
     bases = [site.keys.base for site in sites]
     twice = next((base for base in bases if bases.count(base) > 1), None)
     if twice is not None:

@@ -119,8 +119,13 @@ class Behind(logging.Handler):
                 self._write(_record(logging.WARNING, text))
 
     def _write(self, record: logging.LogRecord) -> None:
+        try:
+            text = self.format(record)
+        except Exception:  # noqa: BLE001 - one line that cannot be made must not end all the others
+            self._lost += 1
+            return
         with contextlib.suppress(OSError, ValueError):  # nobody reads it any more
-            self._out.write(f"{self.format(record)}\n")
+            self._out.write(f"{text}\n")
             self._out.flush()
 
 

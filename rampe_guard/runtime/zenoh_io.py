@@ -28,6 +28,7 @@ T = TypeVar("T")
 
 _CHANGES = 16
 """Comings and goings of a token that wait, and that are looked at once."""
+_LOOK_LIKE = "endpoints look like tcp/127.0.0.1:7447"
 _TOKEN_GRACE_S = 1.0
 """Existing tokens are told of within milliseconds after the subscription."""
 
@@ -275,27 +276,33 @@ def router(endpoints: Sequence[str], config_file: str | None = None) -> Iterator
         config_file: the router's whole configuration instead.
 
     Raises:
-        SettingsError: the configuration file is not valid.
+        SettingsError: the configuration file, or an endpoint, is not valid.
         ConnectionFailedError: an endpoint cannot be listened on, or a certificate not be read.
     """
-    if config_file is None:
-        where, config = ", ".join(endpoints), zenoh.Config()
-        for path, value in (*blank("router"), ("listen/endpoints", json.dumps(list(endpoints)))):
-            config.insert_json5(path, value)
-    else:
-        where = config_file
-        try:
-            config = zenoh.Config.from_file(config_file)
-        except zenoh.ZError as error:
-            raise SettingsError(f"{where}: {str(error).split(' at /')[0]}") from None
+    where = config_file or ", ".join(map(shown, endpoints))
+    try:
+        config = _router_config(endpoints, config_file)
+    except zenoh.ZError as error:
+        help_ = "" if config_file else f"; {_LOOK_LIKE}"
+        raise SettingsError(f"{where}: {_reason(error, endpoints)}{help_}") from None
     try:
         session = zenoh.open(config)
     except zenoh.ZError as error:
-        raise ConnectionFailedError(f"{where}: cannot route: {error}") from None
+        reason = _reason(error, endpoints)
+        raise ConnectionFailedError(f"{where}: cannot route: {reason}") from None
     try:
         yield
     finally:
         session.close()
+
+
+def _router_config(endpoints: Sequence[str], config_file: str | None) -> zenoh.Config:
+    if config_file is not None:
+        return zenoh.Config.from_file(config_file)
+    config = zenoh.Config()
+    for path, value in (*blank("router"), ("listen/endpoints", json.dumps(list(endpoints)))):
+        config.insert_json5(path, value)
+    return config
 
 
 def log_as_told() -> None:
@@ -335,10 +342,8 @@ def _config(settings: ZenohSettings) -> zenoh.Config:
         config = _unchecked_config(settings)
     except (zenoh.ZError, ValueError) as error:
         where = settings.config or f"endpoints {', '.join(map(shown, settings.connect))!r}"
-        reason = redacted(str(error), settings.connect).split(" at /")[0].splitlines()[0]
-        raise SettingsError(
-            f"zenoh: {where}: {reason}; endpoints look like tcp/127.0.0.1:7447"
-        ) from None
+        reason = _reason(error, settings.connect)
+        raise SettingsError(f"zenoh: {where}: {reason}; {_LOOK_LIKE}") from None
     zenoh_rules.check_keys(config.get_json)
     if settings.plain_network:
         return config
@@ -347,6 +352,12 @@ def _config(settings: ZenohSettings) -> zenoh.Config:
     if allowed:
         config.insert_json5("transport/link/protocols", json.dumps(allowed))
     return config
+
+
+def _reason(error: Exception, endpoints: Sequence[str]) -> str:
+    """What Zenoh says, without where in its own code, and without secrets."""
+    text = redacted(str(error), tuple(endpoints)).split(" at /")[0].splitlines()[0]
+    return text.partition('msg: "')[2] or text
 
 
 def _unchecked_config(settings: ZenohSettings) -> zenoh.Config:

@@ -133,3 +133,20 @@ def test_ack_without_a_router_ends_with_2() -> None:
     assert done.returncode == 2
     assert "tcp/127.0.0.1:1" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    "args",
+    [
+        ("router", "foo"),
+        ("router", "tcp/127.0.0.1:99999"),
+        ("dashboard", BENCH, "--port", "0", "--connect", "foo"),
+    ],
+)
+def test_an_endpoint_that_cannot_be_ends_with_2(args: tuple[str, ...]) -> None:
+    done = command(*args)
+    assert done.returncode == 2
+    assert args[-1] in done.stderr
+    assert done.stderr.count("\n") == 1  # no traceback, and no paths of Zenoh's own
+    assert "/zenoh" not in done.stderr
+    assert not done.stdout

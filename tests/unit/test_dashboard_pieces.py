@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import time
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,12 +16,17 @@ from msgspec import structs
 from rampe_guard.client.items import Protection, ProtectionLost, alert_from
 from rampe_guard.core.scene import Box, Capsule, Cylinder, Halfspace, Sphere
 from rampe_guard.dashboard import markup
+from rampe_guard.dashboard.feed import Feed
 from rampe_guard.dashboard.happenings import KEPT_EVENTS, Leads, with_items
 from rampe_guard.dashboard.picture import Banner, Bar, Card, Event
 from rampe_guard.dashboard.places import Places
 from rampe_guard.dashboard.solids import Triangles, solids
 from rampe_guard.dashboard.tones import BY_LEVEL, Tone
+from rampe_guard.errors import SettingsError
+from rampe_guard.runtime.stopping import StopFlag
+from rampe_guard.settings import ZenohSettings, load_site
 from tests.support.messages import ALERT
+from tests.support.processes import BENCH, until
 
 AT = np.array([[1.0, 0, 0, 2.0], [0, 1, 0, 3.0], [0, 0, 1, 4.0], [0, 0, 0, 1]])
 
@@ -63,6 +70,22 @@ def test_a_pulse_goes_on_and_off_until_somebody_has_seen_it() -> None:
     assert changes == pytest.approx(16, abs=1)  # 4 Hz for 2 s
     assert all(Tone.IMMINENT.lit(float(t), attention=False) for t in times)
     assert all(Tone.CAUTION.lit(float(t), attention=True) for t in times)
+
+
+def test_what_ends_the_thread_of_a_feed_ends_the_dashboard() -> None:
+    """Else its page would show for ever that it is connecting."""
+    site = load_site(BENCH)
+    feed = Feed(replace(site, zenoh=ZenohSettings(None, "client", ("foo",))), StopFlag())
+    feed.start()
+
+    def ended() -> bool:
+        try:
+            feed.poll(time.monotonic())
+        except SettingsError as error:
+            return "foo" in str(error)
+        return False
+
+    until(ended, 5.0, "the end told")
 
 
 def extent(body: Triangles) -> tuple[list[float], list[float]]:

@@ -138,6 +138,19 @@ def test_a_reader_that_is_stuck_costs_lines_and_no_time() -> None:
     assert b"line 00000" in got.getvalue()
 
 
+def test_a_line_that_cannot_be_made_ends_no_other() -> None:
+    out = io.StringIO()
+    handler = Behind(out)
+    handler.setFormatter(TextLines())
+    log = logging.getLogger("test.unmade")
+    log.handlers, log.propagate = [handler], False
+    log.warning("too few: %s %s", "one")  # noqa: PLE1206 - what a library may do
+    log.warning("after it")
+    until(lambda: "lines are missing here" in out.getvalue(), 5.0, "said that one is missing")
+    handler.close()
+    assert "after it" in out.getvalue()
+
+
 def test_what_was_said_last_is_written_before_the_end() -> None:
     reading, writing = os.pipe()
     with os.fdopen(writing, "w") as out:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import json
 import socket
@@ -19,7 +20,7 @@ from rampe_guard.notify.messenger import Messenger
 from rampe_guard.notify.post import Post
 from rampe_guard.notify.sound import BELL, Sound
 from rampe_guard.notify.target import NotHeardError
-from rampe_guard.notify.tones import WARNING
+from rampe_guard.notify.tones import IMMINENT, WARNING
 from rampe_guard.programs.notifying import Wishes, notify
 from rampe_guard.runtime.connecting import Network
 from rampe_guard.runtime.stopping import StopFlag
@@ -132,6 +133,29 @@ def test_the_bell_rings_twice_for_a_warning_and_stops_at_once() -> None:
     finally:
         sound.stop()
     assert terminal.getvalue() == "\a\a"
+
+
+def test_a_terminal_that_goes_is_said_and_tried_again() -> None:
+    class Gone(io.StringIO):
+        there = False
+
+        def write(self, text: str) -> int:
+            if not self.there:
+                raise OSError(errno.EIO, "Input/output error")
+            return super().write(text)
+
+    said: list[str] = []
+    terminal = Gone()
+    sound = Sound(BELL, lambda _, text: said.append(text), terminal)
+    try:
+        sound.follow(WARNING)
+        until(lambda: said, 5.0, "words about it")
+        terminal.there = True
+        sound.follow(IMMINENT)
+        until(terminal.getvalue, 5.0, "a bell again")
+    finally:
+        sound.stop()
+    assert "Input/output error" in said[0]
 
 
 def test_a_player_that_fails_is_said() -> None:
