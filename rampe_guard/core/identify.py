@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rampe_guard.core.identify_axis import Lever, levers_of, moved
+from rampe_guard.core.identify_frozen import frozen
 from rampe_guard.core.identify_motion import (
     Estimate,
     Follow,
@@ -19,13 +20,22 @@ from rampe_guard.core.identify_motion import (
     lag,
     top_speed,
 )
-from rampe_guard.core.identify_signals import Signals, Traces, signals_of
+from rampe_guard.core.identify_signals import (
+    GAP_S,
+    BoolArray,
+    Signals,
+    Traces,
+    signals_of,
+    standing,
+)
 
 __all__ = ["DEADBAND_UNSEEN", "Estimate", "Measured", "Traces", "identify"]
 
 DEADBAND_UNSEEN = 0.02
 """Taken where none could be measured: a smaller one warns sooner [-]."""
 _ROUNDS = 2
+_SHOWN = 3
+"""So many stretches are named."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,8 +76,8 @@ def _measured(signals: Signals, j: int, lever: Lever) -> Measured:
     position = signals.position[:, j]
     seen = (float(position.min()), float(position.max()))
     found = Measured(moved(signals)[j], lever, seen)
-    if lever.problem:
-        found = replace(found, problems=(lever.problem,))
+    known, stood = _alive(signals, j, lever)
+    found = replace(found, problems=(*((lever.problem,) if lever.problem else ()), *stood))
     if not found.moved:
         return found
     axis = lever.axis if lever.sign else None
@@ -76,7 +86,7 @@ def _measured(signals: Signals, j: int, lever: Lever) -> Measured:
         lever=unseen if axis is None else lever.sign * signals.axes[:, axis],
         position=position,
         velocity=signals.velocity[:, j],
-        known=signals.known,
+        known=known,
         best_lag_s=lever.lag_s,
         lag_s=lever.lag_s,
         noise=float(signals.noise[j]),
@@ -108,6 +118,30 @@ def _measured(signals: Signals, j: int, lever: Lever) -> Measured:
         if value is None
     ]
     return replace(found, problems=(*found.problems, *missing))
+
+
+def _alive(signals: Signals, j: int, lever: Lever) -> tuple[BoolArray, tuple[str, ...]]:
+    """When an actuator's position could be believed, and in words when it could not."""
+    begin_s = float(signals.time_s[0])
+    told = list(signals.frozen)
+    known = signals.known
+    # a sensor without noise rests to the last digit, whatever another's lever does
+    levers = slice(None) if lever.axis is None else slice(lever.axis, lever.axis + 1)
+    if lever.axis is not None or signals.noise[j] > 0.0:
+        grid = signals.time_s
+        position = np.where(known, signals.position[:, j], np.nan)
+        own = frozen(grid, position[:, None], grid, signals.axes[:, levers], GAP_S)
+        known = known & ~standing(grid, grid, own, signals.window_s)
+        told += [(float(grid[a]) - begin_s, float(grid[b]) - begin_s) for a, b in own]
+    if not told:
+        return known, ()
+    when = ", ".join(f"{since_s:.0f} to {until_s:.0f} s" for since_s, until_s in told[:_SHOWN])
+    more = f" and {len(told) - _SHOWN} times more" if len(told) > _SHOWN else ""
+    words = (
+        f"its position stood still to the last digit from {when}{more} while a lever was pushed:"
+        " a frozen sensor, a machine that was off, an end stop? Nothing is measured from that"
+    )
+    return known, (words,)
 
 
 def _band(begins: Estimate | None) -> float:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rampe_guard.core.identify_signals import STEP_S, Signals, runs
+from rampe_guard.core.identify_signals import GAP_S, STEP_S, BoolArray, Signals, runs
 from rampe_guard.core.types import FloatArray
 
 LONGEST_LAG_S = 1.0
@@ -34,6 +34,7 @@ _RIVAL = 0.4
 _MOVED_NOISE = 12.0
 _MOVED_SHARE = 0.004
 _RIDGE = 1e-6
+_STILL = "it did not move"
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,15 +67,32 @@ def moved(signals: Signals) -> list[bool]:
 
 def levers_of(signals: Signals) -> list[Lever]:
     """The lever of every actuator, each lever at most once."""
-    told = _explained(signals)
     here = moved(signals)
+    if words := _hopeless(signals):
+        return [Lever(None, 0, 0.0, 0.0, words if it else _STILL) for it in here]
+    told = _explained(signals)
     found = [
-        _sure(signals, _choose(told, j), j)
-        if here[j]
-        else Lever(None, 0, 0.0, 0.0, "it did not move")
+        _sure(signals, _choose(told, j), j) if here[j] else Lever(None, 0, 0.0, 0.0, _STILL)
         for j in range(signals.velocity.shape[1])
     ]
     return _once(found)
+
+
+def _hopeless(signals: Signals) -> str:
+    """Why no lever can be told from any of it; empty if one may be."""
+    if not _used(signals).any():
+        return "no lever was moved: are these the levers? Move each, one at a time"
+    if signals.period_s > GAP_S:
+        return (
+            f"positions are {signals.period_s:.2g} s apart, and between two that are more than"
+            f" {GAP_S:g} s apart nothing is known"
+        )
+    return ""
+
+
+def _used(signals: Signals) -> BoolArray:
+    """Which levers were moved at all."""
+    return np.asarray(np.ptp(signals.axes, axis=0) > _USED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +107,7 @@ class _Explained:
 
 def _explained(signals: Signals) -> _Explained:
     known, velocity = signals.known[::_EVERY], signals.velocity[::_EVERY]
-    used = np.ptp(signals.axes, axis=0) > _USED
+    used = _used(signals)
     levers = np.where(used, signals.axes, 0.0)[::_EVERY]
     m, n = levers.shape[1], velocity.shape[1]
     lags, shares, signs, together = [0.0], [np.zeros((m, n))], [np.zeros((m, n))], [np.zeros(n)]
@@ -168,7 +186,7 @@ def _sure(signals: Signals, lever: Lever, j: int) -> Lever:
 def _votes(signals: Signals, axis: int, j: int) -> list[int]:
     """Which way an actuator went after each push of a lever from rest, times that of the push."""
     lever, speed = signals.axes[:, axis], signals.velocity[:, j]
-    top = float(np.abs(speed).max())
+    top = float(np.abs(speed[signals.known]).max(initial=0.0))
     before, after = round(_REST_S / STEP_S), round(_ANSWER_S / STEP_S)
     found = []
     for begin, end in runs(np.abs(lever) > _OUT):

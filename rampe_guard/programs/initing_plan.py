@@ -5,6 +5,7 @@ What could not be measured gets a value that warns early rather than late, and a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -27,6 +28,17 @@ _MORE = 1.05
 _RISING = 1.5
 """What is taken of a speed that was still rising when it was seen."""
 _FEW = 3
+_OTHER_UNITS = {
+    "rad": (("degrees", math.pi / 180.0),),
+    "m": (("centimetres", 0.01), ("millimetres", 0.001)),
+}
+"""What positions may be in, and what makes them those of a URDF."""
+_FAR = 3.0
+"""Positions in another unit are so many times beyond the ends, at least."""
+_MOST_END = 1e6
+"""No joint gets so far [rad or m]: such limits are none."""
+_WIDEST_DEADBAND = 0.3
+"""No lever needs more to begin to move something: what was measured so was something else [-]."""
 _BEYOND = 0.05
 """Share of its range by which a position may be outside before a guard refuses it."""
 
@@ -196,9 +208,7 @@ def _actuator(
         max_velocity=speed,
         max_deceleration=_said(stop, usual, slow, up=False),
         lag_s=_said(None if one is None else one.lag_s, LAG_UNSEEN_S, "not measured", up=True),
-        deadband=_said(
-            None if one is None else one.deadband, DEADBAND_UNSEEN, "not measured", up=False, few=0
-        ),
+        deadband=_deadband(one),
         seen="" if one is None else f"{one.seen[0]:.4g} … {one.seen[1]:.4g} {unit}",
         drive=drive,
         limits=limits,
@@ -208,6 +218,14 @@ def _actuator(
 
 def _speed(joint: MovableJoint, unit: str, one: Measured | None) -> Said:
     seen = None if one is None else one.max_velocity
+    if one is not None and seen is not None and not one.lever.sign:
+        most = joint.velocity if unit == unit_of(joint) else None
+        value = max((_MORE if seen.events else _RISING) * seen.value, most or TOP_UNSEEN[unit])
+        return Said(
+            _nice(value, up=True),
+            f"not measured: by no lever that is known; {seen.how}",
+            todo=True,
+        )
     if seen is not None and not seen.events:
         most = joint.velocity if unit == unit_of(joint) else None
         value = max(_RISING * seen.value, 0.0 if most is None else min(most, 2.0 * seen.value))
@@ -220,12 +238,23 @@ def _speed(joint: MovableJoint, unit: str, one: Measured | None) -> Said:
     return Said(TOP_UNSEEN[unit], "not measured", todo=True)
 
 
+def _deadband(one: Measured | None) -> Said:
+    seen = None if one is None else one.deadband
+    if seen is not None and seen.value > _WIDEST_DEADBAND:
+        why = f"less than measured, which is more than levers have: {seen.how}"
+        return Said(_WIDEST_DEADBAND, why, todo=True)
+    return _said(seen, DEADBAND_UNSEEN, "not measured", up=False, few=1)
+
+
 def _limits(
     joint: MovableJoint, drive: dict[str, Any] | None, one: Measured | None
 ) -> tuple[Said | None, tuple[str, ...]]:
     """Limits to write, if the URDF's will not do, and what is wrong with what was seen."""
     seen = None if one is None or not one.moved else one.seen
     low, high = joint.lower, joint.upper
+    if drive is None and math.isfinite(low) and max(-low, high) > _MOST_END:
+        text = f"the URDF's limits {low:.4g} … {high:.4g} are no joint's: correct them there, or"
+        return None, (f"{text} write limits: {{lower: …, upper: …}} here",)
     if drive is not None or not np.isfinite(high - low):
         if seen is None or (drive is None and joint.kind != "prismatic"):
             return None, ()
@@ -234,11 +263,21 @@ def _limits(
         return Said(ends, "as far as it was seen to go; give the true ends", todo=True), ()
     if seen is None:
         return None, ()
+    return None, _beyond(joint, seen)
+
+
+def _beyond(joint: MovableJoint, seen: tuple[float, float]) -> tuple[str, ...]:
+    """What is wrong if an actuator was seen where its joint cannot be."""
+    low, high = joint.lower, joint.upper
     slack = _BEYOND * (high - low)
     if seen[0] >= low - slack and seen[1] <= high + slack:
-        return None, ()
+        return ()
     text = f"it was at {seen[0]:.4g} … {seen[1]:.4g}, beyond the URDF's {low:.4g} … {high:.4g}: "
-    return None, (f"{text}another joint, another unit, or a cylinder (--cylinder)?",)
+    far = max(map(abs, seen)) > _FAR * max(abs(low), abs(high))
+    for words, scale in _OTHER_UNITS[unit_of(joint)] if far else ():
+        if seen[0] * scale >= low - slack and seen[1] * scale <= high + slack:
+            return (f"{text}{words}? Of a CSV log, --actuators COLUMN:{scale:.7g} mends it",)
+    return (f"{text}another joint, another unit, or a cylinder (--cylinder)?",)
 
 
 def _said(estimate: Estimate | None, else_: float, why: str, *, up: bool, few: int = _FEW) -> Said:
