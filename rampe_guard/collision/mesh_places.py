@@ -3,6 +3,9 @@
 package://NAME/REST     in each of the site's `package_dirs`, which may be the package itself,
 model://NAME/REST       or hold it; then in the folders above the URDF, nearest first
 file:///PATH, PATH      as it says, from the URDF's folder
+
+Where there is nothing of a name with %20 and the like, it is looked for without them too: those
+who write URDFs take such names for addresses of the web.
 """
 
 from __future__ import annotations
@@ -10,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
+from urllib.parse import unquote
 
 from rampe_guard.collision.xml_check import read_xml
 from rampe_guard.errors import GeometryError
@@ -38,6 +42,9 @@ def mesh_file(
     Raises:
         GeometryError: it is not there, or lies outside of ``folders``.
     """
+    plain = unquote(name)
+    if plain != name and not _is_there(name, urdf, folders, package_dirs):
+        name = plain if _is_there(plain, urdf, folders, package_dirs) else name
     try:
         file = _named_file(name, urdf, folders, package_dirs)
         if folders is None or folders.hold(file):
@@ -48,6 +55,15 @@ def mesh_file(
         reason = getattr(error, "strerror", None) or error
         raise GeometryError(f"{urdf}: mesh {name!r} cannot be looked for ({reason})") from None
     raise GeometryError(f"{urdf}: mesh {name!r} {wrong}; {remedy}")
+
+
+def _is_there(
+    name: str, urdf: Path, folders: Folders | None, package_dirs: tuple[str, ...]
+) -> bool:
+    try:
+        return _named_file(name, urdf, folders, package_dirs).is_file()
+    except (GeometryError, OSError, ValueError):
+        return False
 
 
 def _named_file(
@@ -86,11 +102,13 @@ def _shut(place: str, folders: Folders | None) -> str:
 
 def manifest_of(name: str, file: Path) -> Path | None:
     """The manifest of the package in which a mesh was found by its name; None if there is none."""
-    rest = name.partition("://")[2].partition("/")[2]
-    if not name.startswith(_PACKAGES) or not file.as_posix().endswith("/" + rest):
+    if not name.startswith(_PACKAGES):
         return None
-    manifest = Path(file.as_posix().removesuffix("/" + rest)) / _MANIFEST
-    return manifest if manifest.is_file() else None
+    for rest in (text.partition("://")[2].partition("/")[2] for text in (name, unquote(name))):
+        if file.as_posix().endswith("/" + rest):
+            manifest = Path(file.as_posix().removesuffix("/" + rest)) / _MANIFEST
+            return manifest if manifest.is_file() else None
+    return None
 
 
 def _candidates(

@@ -253,7 +253,7 @@ def proven_limits(
                     low, high = max(low, least), min(high, most)
             try:
                 for name, joint in mine.items():
-                    _check_joint(name, joint, joints[name].type, (low, high))
+                    _check_joint(joints[name], joint, (low, high))
             except GeometryError as error:
                 if slack == SLACKS[-1]:
                     raise GeometryError(f"{path}: {error}") from error
@@ -263,9 +263,19 @@ def proven_limits(
     return proven
 
 
-def _check_joint(name: str, joint: JointMap, kind: str, ends: tuple[float, float]) -> None:
-    if kind == "prismatic" and not np.isfinite(ends).all():
-        raise GeometryError(f"joint '{name}' slides without limits; give limits of its actuator")
+def _check_joint(described: Joint, joint: JointMap, ends: tuple[float, float]) -> None:
+    name = described.name
+    if described.type == "prismatic" and not np.isfinite(ends).all():
+        mimic = described.mimic
+        if mimic is None:
+            raise GeometryError(
+                f"joint '{name}' slides without limits; give limits of its actuator"
+            )
+        raise GeometryError(
+            f"joint '{name}' slides and follows (mimic) joint '{mimic.joint}', which has no limits:"
+            f" give limits of the actuator that moves '{mimic.joint}' in the site file, or correct"
+            " the mimic"
+        )
     try:
         check_monotone(joint.drive, *ends)
     except GeometryError as error:

@@ -68,15 +68,13 @@ class LinkReader:
         if geometry.mesh is not None:
             return self._file(geometry.mesh, where)
         if geometry.box is not None:
-            return box_mesh(np.array(_sizes(geometry.box.size, where)))
+            return box_mesh(np.array(geometry.box.size))
         if geometry.sphere is not None:
-            (radius,) = _sizes((geometry.sphere.radius,), where)
-            return ball_mesh(radius)
+            return ball_mesh(geometry.sphere.radius)
         rod = geometry.cylinder or geometry.capsule
         if rod is not None:
-            radius, length = _sizes((rod.radius, rod.length), where)
             make = prism_mesh if geometry.cylinder else capsule_mesh
-            return make(radius, length)
+            return make(rod.radius, rod.length)
         raise GeometryError(
             f"{where}: a shape <{geometry.tag}>; use mesh, box, cylinder, capsule or sphere"
         )
@@ -84,15 +82,7 @@ class LinkReader:
     def _file(self, mesh: Mesh, where: str) -> TriangleMesh:
         file = mesh_file(mesh.filename, self.urdf, self.folders, self.package_dirs)
         scale = np.ones(3) if mesh.scale is None else np.array(mesh.scale)
-        if not (np.isfinite(scale).all() and np.all(scale != 0.0)):
-            raise GeometryError(f"{where}: mesh {file} has scale {list(scale)}")
         read = load_mesh(file, scale)
         extent = float(np.ptp(read.vertices, axis=0).max())
         said = check_extent(extent, f"{where}: {file}", LINK_MOST_M)
         return replace(read, notes=(*read.notes, *said))
-
-
-def _sizes(sizes: tuple[float, ...], where: str) -> tuple[float, ...]:
-    if not all(np.isfinite(size) and size > 0.0 for size in sizes):
-        raise GeometryError(f"{where}: a shape of size {list(sizes)}")
-    return sizes

@@ -6,7 +6,7 @@ from typing import Final
 
 import msgspec
 
-LAYOUT: Final = 2
+LAYOUT: Final = 3
 """Count up when the classes below, or what is read into them, change."""
 
 Matrix = tuple[tuple[float, ...], ...]

@@ -131,22 +131,41 @@ class _Reader:
         kind = kinds[0]
         match kind.tag:
             case "mesh":
-                scale = None if kind.get("scale") is None else self._numbers(kind, "scale", (1, 3))
-                if scale is not None and len(scale) == 1:
-                    scale = scale * 3
-                return Geometry(tag="mesh", mesh=Mesh(self._text(kind, "filename"), scale))
+                return Geometry(tag="mesh", mesh=self._mesh(kind))
             case "box":
-                return Geometry(tag="box", box=Box(self._numbers(kind, "size", (3,))))
+                return Geometry(tag="box", box=Box(self._sizes(kind, "size", 3)))
             case "cylinder":
-                made = Cylinder(self._number(kind, "radius"), self._number(kind, "length"))
+                made = Cylinder(*self._sizes(kind, "radius"), *self._sizes(kind, "length"))
                 return Geometry(tag="cylinder", cylinder=made)
             case "capsule":
-                round_ended = Capsule(self._number(kind, "radius"), self._number(kind, "length"))
+                round_ended = Capsule(*self._sizes(kind, "radius"), *self._sizes(kind, "length"))
                 return Geometry(tag="capsule", capsule=round_ended)
             case "sphere":
-                return Geometry(tag="sphere", sphere=Sphere(self._number(kind, "radius")))
+                return Geometry(tag="sphere", sphere=Sphere(*self._sizes(kind, "radius")))
             case _:
                 return Geometry(tag=kind.tag)
+
+    def _mesh(self, element: Element) -> Mesh:
+        name = self._text(element, "filename")
+        if element.get("scale") is None:
+            return Mesh(name, None)
+        scale = self._numbers(element, "scale", (1, 3))
+        if not all(math.isfinite(factor) and factor != 0.0 for factor in scale):
+            raise self._wrong(
+                element,
+                f'<mesh> has scale="{element.get("scale")}"; give factors that are finite and not 0'
+                ' (scale="0.001 0.001 0.001" for millimetres)',
+            )
+        return Mesh(name, scale * 3 if len(scale) == 1 else scale)
+
+    def _sizes(self, element: Element, key: str, count: int = 1) -> tuple[float, ...]:
+        sizes = self._numbers(element, key, (count,))
+        if not all(math.isfinite(size) and size > 0.0 for size in sizes):
+            raise self._wrong(
+                element,
+                f'<{element.tag}> has {key}="{element.get(key)}"; give more than 0 [m]',
+            )
+        return sizes
 
     def _joint(self, element: Element) -> Joint:
         name, kind = self._text(element, "name"), self._text(element, "type")
@@ -162,14 +181,7 @@ class _Reader:
             self._text(self._child(element, "child"), "link"),
             self._origin(element),
             None if axis is None else self._numbers(axis, "xyz", (3,), "1 0 0"),
-            None
-            if limit is None
-            else Limit(
-                *(
-                    None if limit.get(end) is None else self._number(limit, end)
-                    for end in ("lower", "upper", "velocity")
-                )
-            ),
+            None if limit is None else self._limit(limit, name, kind),
             None
             if mimic is None
             else Mimic(
@@ -178,6 +190,41 @@ class _Reader:
                 self._number(mimic, "offset", "0"),
             ),
         )
+
+    def _limit(self, element: Element, name: str, kind: str) -> Limit:
+        """Ends that are read wrongly would move what is guarded without a word: none is guessed."""
+        lower, upper, velocity = (
+            None if element.get(key) is None else self._number(element, key)
+            for key in ("lower", "upper", "velocity")
+        )
+        joint = f"joint '{name}'"
+        if kind in ("revolute", "prismatic"):  # the others have no ends
+            for key, end in (("lower", lower), ("upper", upper)):
+                if end is not None and math.isnan(end):
+                    raise self._wrong(
+                        element, f'{joint} has {key}="{element.get(key)}"; give a number [rad or m]'
+                    )
+            if lower is not None and upper is not None:
+                self._check_ends(element, joint, lower, upper)
+        if kind != "fixed" and velocity is not None and not velocity >= 0.0:
+            raise self._wrong(
+                element,
+                f'{joint} has velocity="{element.get("velocity")}"; give its top speed [rad/s or'
+                " m/s], or leave it out",
+            )
+        return Limit(lower, upper, velocity)
+
+    def _check_ends(self, element: Element, joint: str, lower: float, upper: float) -> None:
+        if lower > upper:
+            raise self._wrong(
+                element, f"{joint} has lower={lower:g} above upper={upper:g}; exchange them"
+            )
+        if math.isinf(lower) != math.isinf(upper) or lower == upper in (math.inf, -math.inf):
+            raise self._wrong(
+                element,
+                f"{joint} has lower={lower:g} and upper={upper:g}; give two finite ends, or none"
+                ' (type="continuous")',
+            )
 
     def _origin(self, above: Element) -> Matrix | None:
         element = above.find("origin")

@@ -119,7 +119,7 @@ def test_visual_stands_in_where_there_is_no_collision_and_scale_counts(tmp_path:
         ),
         (
             f'<link name="a"/><link name="b">{BOX.replace("1 1 1", "1 -1 1")}</link>{TURN}',
-            "link 'b': a shape of size",
+            r'arm.urdf:1: <box> has size="1 -1 1"; give more than 0',
         ),
         (
             f'<link name="a"/><link name="b">{MESH.format("gone.stl")}</link>{TURN}',

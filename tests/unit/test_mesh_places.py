@@ -118,3 +118,36 @@ def test_a_site_names_its_packages_and_a_recording_takes_them_along(tmp_path: Pa
     assert any(name.endswith("clone/meshes/b.stl") for name in bundle.files)
     again = load_site(unpack(bundle, copy), within=copy)
     assert load_arm(again.arm).meshes[1] is not None
+
+
+@pytest.mark.parametrize("name", ["parts/Ausleger 1.stl", "parts/Ausleger%201.stl"])
+@pytest.mark.parametrize("scheme", ["", "file://{}/", "package://site/"])
+def test_a_name_may_be_written_as_on_the_web(tmp_path: Path, name: str, scheme: str) -> None:
+    folder = tmp_path / "site"
+    (folder / "parts").mkdir(parents=True)
+    mesh = write_stl(folder / "parts" / "Ausleger 1.stl", box_triangles((1, 1, 1)))
+    found = mesh_file(scheme.format(folder) + name, folder / "arm.urdf", Folders.of(folder))
+    assert found == mesh
+    odd = write_stl(folder / "parts" / "Ausleger%201.stl", box_triangles((1, 1, 1)))
+    literal = mesh_file(scheme.format(folder) + name, folder / "arm.urdf", Folders.of(folder))
+    assert literal == (odd if "%" in name else mesh)
+
+
+@pytest.mark.parametrize("name", ["%2e%2e/secret.stl", "a%00.stl"])
+def test_a_name_of_the_web_leads_nowhere_else(tmp_path: Path, name: str) -> None:
+    (tmp_path / "site").mkdir()
+    write_stl(tmp_path / "secret.stl", box_triangles((1, 1, 1)))
+    try:
+        file = mesh_file(name, tmp_path / "site" / "arm.urdf", Folders.of(tmp_path / "site"))
+    except GeometryError:
+        return
+    assert not file.exists()
+
+
+def test_a_recording_takes_along_what_is_named_as_on_the_web(tmp_path: Path) -> None:
+    (tmp_path / "site").mkdir()
+    write_stl(tmp_path / "site" / "b 1.stl", box_triangles((1, 1, 1)))
+    path = site(tmp_path / "site", ".", ".")
+    (tmp_path / "site" / "arm.urdf").write_text(URDF.replace(NAME, "b%201.stl"))
+    again = load_site(unpack(gather(load_site(path)), tmp_path / "copy"), within=tmp_path / "copy")
+    assert load_arm(again.arm).meshes[1] is not None

@@ -34,6 +34,7 @@ def written(folder: Path, body: str, name: str = "arm.urdf") -> Path:
     return path
 
 
+MESH = '<collision><geometry><mesh filename="a.stl" scale="{}"/></geometry></collision>'
 TURN = '<axis xyz="0 0 1"/><limit lower="-1" upper="2" velocity="1.5" effort="1"/>'
 TWO = link("a") + link("b", BOX) + joint("turn", "revolute", "a", "b", TURN)
 
@@ -80,6 +81,20 @@ RING = link("c") + link("d") + joint("x", "fixed", "c", "d") + joint("y", "fixed
         (TWO.replace('<box size="1 1 1"/>', ""), "<geometry>.*needs one shape|needs one shape"),
         (TWO.replace('<box size="1 1 1"/>', "<cone/>"), "link 'b': a shape <cone>"),
         (TWO.replace("0 0 1", "0 0"), r'<axis> has xyz="0 0"'),
+        (TWO.replace('"-1"', '"nan"'), r"arm.urdf:3: joint 'turn' has lower=\"nan\"; give a num"),
+        (TWO.replace('"2"', '"-nan"'), r"arm.urdf:3: joint 'turn' has upper=\"-nan\"; give a num"),
+        (TWO.replace('"2"', '"-2"'), r"urdf:3: joint 'turn' has lower=-1 above upper=-2; exchange"),
+        (TWO.replace('"-1"', '"-inf"'), r"urdf:3: joint 'turn' has lower=-inf and upper=2; give"),
+        (TWO.replace('"1.5"', '"-1"'), r"arm.urdf:3: joint 'turn' has velocity=\"-1\"; give its"),
+        (TWO.replace('"1.5"', '"nan"'), r"arm.urdf:3: joint 'turn' has velocity=\"nan\"; give its"),
+        (link("a", MESH.format("0 1 1")), r'urdf:1: <mesh> has scale="0 1 1"; give .* not 0'),
+        (link("a", MESH.format("nan")), r'arm.urdf:1: <mesh> has scale="nan"; give factors'),
+        (TWO.replace("1 1 1", "1 0 1"), r'arm.urdf:2: <box> has size="1 0 1"; give more than 0'),
+        (
+            TWO.replace('type="revolute"', 'type="continuous"') + link("c")
+            + joint("slide", "prismatic", "b", "c", '<mimic joint="turn"/>' + TURN),
+            "joint 'slide' slides and follows .mimic. joint 'turn', which has no limits: give",
+        ),
     ],
 )  # fmt: skip
 def test_what_is_no_urdf_is_told_with_what_to_do(tmp_path: Path, body: str, words: str) -> None:
@@ -96,6 +111,20 @@ def test_a_file_called_xacro_is_one(tmp_path: Path) -> None:
 def test_expressions_that_are_none_of_its_arm_harm_nobody(tmp_path: Path) -> None:
     plugin = '<gazebo><plugin filename="$(find somewhere)/it.so"/></gazebo>'
     assert len(read_urdf(written(tmp_path, TWO + plugin)).links) == 2
+
+
+@pytest.mark.parametrize(
+    ("kind", "limit"),
+    [
+        ("continuous", '<limit lower="nan" upper="-1" velocity="1"/>'),  # it has no ends
+        ("revolute", '<limit lower="-inf" upper="inf" velocity="inf"/>'),
+        ("revolute", '<limit effort="1" velocity="0"/>'),
+    ],
+)
+def test_a_joint_may_have_no_ends(tmp_path: Path, kind: str, limit: str) -> None:
+    body = link("a") + link("b", BOX) + joint("turn", kind, "a", "b", limit)
+    (turn,) = movable_joints(read_urdf(written(tmp_path, body)))
+    assert (turn.lower, turn.upper) == (-np.inf, np.inf)
 
 
 def test_joints_that_can_be_driven_come_with_limits_and_speeds(tmp_path: Path) -> None:
