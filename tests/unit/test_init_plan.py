@@ -32,7 +32,8 @@ def test_what_was_measured_is_believed() -> None:
     one = _plan(SEEN)
     assert one.max_velocity.value == pytest.approx(0.525)
     assert one.deadband.value == 0.05
-    assert not (one.max_velocity.todo or one.deadband.todo)
+    assert not one.max_velocity.todo
+    assert not one.deadband.todo
     assert one.problems == ()
 
 
