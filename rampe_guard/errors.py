@@ -28,8 +28,8 @@ class RampeGuardError(Exception):
         return (str(self),)
 
 
-class SettingsError(RampeGuardError):
-    """A site or scene file is wrong; the message names file, line, key, value and remedy.
+class _LinesError(RampeGuardError):
+    """One of several lines.
 
     Args:
         problems: each is a line.
@@ -39,7 +39,7 @@ class SettingsError(RampeGuardError):
         super().__init__("\n".join(problems))
         self._problems = problems
 
-    def __reduce__(self) -> tuple[type[SettingsError], tuple[str, ...]]:
+    def __reduce__(self) -> tuple[type[_LinesError], tuple[str, ...]]:
         """From one process to another it keeps its lines."""
         return type(self), self._problems
 
@@ -47,6 +47,10 @@ class SettingsError(RampeGuardError):
     def lines(self) -> tuple[str, ...]:
         """The problems."""
         return self._problems
+
+
+class SettingsError(_LinesError):
+    """A site or scene file is wrong; the message names file, line, key, value and remedy."""
 
 
 class GeometryError(RampeGuardError):
@@ -65,7 +69,7 @@ class MessageError(RampeGuardError):
         super().__init__(f"{reason}: {detail}")
 
 
-class LogError(RampeGuardError):
+class LogError(_LinesError):
     """A recording cannot be replayed; the message names file, line or column, and why."""
 
 

@@ -128,7 +128,7 @@ def cut(config: GuardConfig, limits: FloatArray, log: Log) -> Run:
         segments=complete,
         incomplete=len(found) - len(complete),
         rows=len(log.time_s),
-        left_out=len(log.warnings),
+        left_out=len(log.left_out),
         refused=follower.refused,
         duration_s=float(log.time_s[-1] - log.time_s[0]),
         low=follower.low,

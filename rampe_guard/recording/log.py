@@ -25,7 +25,12 @@ class Log(Protocol):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What was left out of it, a sentence each."""
+        """What is wrong with it, a sentence each."""
+        ...
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """What of that could not be read."""
         ...
 
     @property

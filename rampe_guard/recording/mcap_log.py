@@ -66,6 +66,11 @@ class McapLog:
             )
 
     @property
+    def left_out(self) -> tuple[str, ...]:
+        """What could not be read, or is not there."""
+        return self.warnings
+
+    @property
     def last_s(self) -> float:
         """Time of the last message [s]."""
         return self._time_s(self.reading.last_ns)

@@ -8,15 +8,16 @@ learning from it would be worse than no log.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
-from rampe_guard.core.inputs import AXIS_SLACK
+from rampe_guard.core.inputs import AXIS_SLACK, InputGate, Rejection
 from rampe_guard.core.types import ActuatorSample, FloatArray, Inputs, JoystickSample
 from rampe_guard.errors import LogError
-from rampe_guard.runtime.csv_rows import mapped_rows, time_problems
+from rampe_guard.runtime.csv_rows import numbered_rows, time_problems
 from rampe_guard.runtime.replay import idle_times
 from rampe_guard.settings import ColumnMap, Site
 
@@ -36,14 +37,23 @@ class CsvLog:
         time_s: (k,) as logged [s].
         axes: (k, m) [-].
         position: (k, n) [unit].
-        warnings: one per row that was left out, naming its line.
+        left_out: one sentence per row that was left out, naming its line.
+        refused: one per reason for which a guard refuses some, naming the line of the first.
+        sound: (k,) whether a guard takes the position for one of the arm; None: all of them.
     """
 
     path: str
     time_s: FloatArray
     axes: FloatArray
     position: FloatArray
-    warnings: tuple[str, ...]
+    left_out: tuple[str, ...]
+    refused: tuple[str, ...] = ()
+    sound: npt.NDArray[np.bool_] | None = None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """All that is wrong with it."""
+        return (*self.left_out, *self.refused)
 
     def samples(self) -> Iterator[tuple[JoystickSample, ActuatorSample]]:
         """One pair of samples a row; they arrive when they were stamped."""
@@ -76,8 +86,9 @@ class CsvLog:
             yield now_s, Inputs((joystick,), (actuators,))
 
     def positions(self) -> Iterator[tuple[float, FloatArray]]:
-        """Where the arm was: time [s] and position (n,) of every row."""
-        yield from zip(self.time_s.tolist(), self.position, strict=True)
+        """Where the arm was: time [s] and position (n,) of every row that a guard accepts."""
+        some = slice(None) if self.sound is None else self.sound
+        yield from zip(self.time_s[some].tolist(), self.position[some], strict=True)
 
 
 def read_csv_log(site: Site, path: str | Path, limits: FloatArray) -> CsvLog:
@@ -97,14 +108,36 @@ def read_csv_log(site: Site, path: str | Path, limits: FloatArray) -> CsvLog:
     names = site.actuator_names
     columns = [mapping.time]
     columns += [mapping.joystick[n] for n in names] + [mapping.actuators[n] for n in names]
-    rows, warnings = mapped_rows(Path(path), columns)
+    rows, lines, warnings = numbered_rows(Path(path), columns)
     n = len(names)
     axes = np.zeros((len(rows), site.guard.axes))
     for j, actuator in enumerate(site.guard.actuators):
         axes[:, actuator.axis] = rows[:, 1 + j]
     log = CsvLog(str(path), rows[:, 0], axes, rows[:, 1 + n :], tuple(warnings))
     _check(site, log, limits)
-    return log
+    sound, refused = _gated(site, log, limits, lines)
+    return replace(log, sound=sound, refused=tuple(refused))
+
+
+def _gated(
+    site: Site, log: CsvLog, limits: FloatArray, lines: list[int]
+) -> tuple[npt.NDArray[np.bool_], list[str]]:
+    """Which positions a guard accepts (k,), and a warning for each reason why not."""
+    config = site.guard
+    gate = InputGate(config.actuators, limits, config.inputs, config.axes)
+    sound = np.ones(len(lines), dtype=np.bool_)
+    found: dict[str, list[tuple[int, str]]] = {}
+    for k, (joystick, actuators) in enumerate(log.samples()):
+        for verdict in (gate.joystick(joystick), gate.actuators(actuators)):
+            if isinstance(verdict, Rejection):
+                sound[k] &= verdict.input != "actuators"
+                key = f"{verdict.input}: {verdict.reason}"
+                found.setdefault(key, []).append((lines[k], verdict.detail))
+    return sound, [
+        f"{log.path}:{where[0][0]}: a guard refuses this row ({key}: {where[0][1]})"
+        + (f", and {len(where) - 1} more for this reason" if len(where) > 1 else "")
+        for key, where in found.items()
+    ]
 
 
 def _check(site: Site, log: CsvLog, limits: FloatArray) -> None:
@@ -124,10 +157,10 @@ def _check(site: Site, log: CsvLog, limits: FloatArray) -> None:
         )
         problems += _against(mapping.joystick[name], name, u * actuator.sign, q)
     if problems:
-        text = "\n  ".join(problems)
         raise LogError(
-            f"{log.path}: this cannot be what the site file's 'log' says:\n  {text}\n"
-            f"  Are columns swapped, or is a scale wrong? Nothing was learned from it."
+            f"{log.path}: this cannot be what the site file's 'log' says:",
+            *(f"  {problem}" for problem in problems),
+            "  Are columns swapped, or is a scale wrong? Nothing was learned from it.",
         )
 
 

@@ -48,7 +48,15 @@ def mapped_rows(path: Path, columns: Sequence[ColumnMap]) -> tuple[FloatArray, l
     Raises:
         LogError: it cannot be read, a column is missing or there twice, or no row is whole.
     """
-    rows, warnings = [], []
+    rows, _, warnings = numbered_rows(path, columns)
+    return rows, warnings
+
+
+def numbered_rows(
+    path: Path, columns: Sequence[ColumnMap]
+) -> tuple[FloatArray, list[int], list[str]]:
+    """The same, with the line of the file on which each row ends."""
+    rows, lines, warnings = [], [], []
     with _opened(path) as file:
         reader = csv.DictReader(file)
         header = _header(path, list(reader.fieldnames or []))
@@ -60,9 +68,10 @@ def mapped_rows(path: Path, columns: Sequence[ColumnMap]) -> tuple[FloatArray, l
                 warnings.append(f"{path}:{reader.line_num}: row left out: {problem}")
             else:
                 rows.append(values)
+                lines.append(reader.line_num)
     if not rows:
         raise LogError(f"{path}: no usable row{'; ' + warnings[0] if warnings else ''}")
-    return np.array(rows), warnings
+    return np.array(rows), lines, warnings
 
 
 def time_problems(column: ColumnMap, time_s: FloatArray) -> list[str]:

@@ -1,3 +1,4 @@
+import pickle
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import pytest
 from rampe_guard.errors import LogError
 from rampe_guard.resources import shipped_site
 from rampe_guard.runtime.csv_log import read_csv_log
+from rampe_guard.runtime.log_lines import complaint
 from rampe_guard.settings import ColumnMap, LogMapping, Site, load_site
 
 HEADER = "t,u_swing,u_boom,u_stick,u_bucket,swing,boom,stick,bucket"
@@ -124,3 +126,36 @@ def test_time_in_milliseconds_is_refused(site: Site, tmp_path: Path) -> None:
     assert "rows are 50 s apart: is time in seconds?" in refusal(
         site, write(tmp_path / "a.csv", data)
     )
+
+
+def test_a_refusal_is_told_line_by_line_in_whatever_process_it_arose(
+    site: Site, tmp_path: Path
+) -> None:
+    data = [[row[0] * 1000.0, *row[1:6], row[6] * 10.0, *row[7:]] for row in rows()]
+    with pytest.raises(LogError) as caught:
+        read_csv_log(site, write(tmp_path / "a.csv", data), LIMITS)
+    error = pickle.loads(pickle.dumps(caught.value))  # noqa: S301 - our own
+    assert len(error.lines) == 4
+    assert "rows are 50 s apart" in error.lines[1]
+    assert "limits of 'boom'" in error.lines[2]
+    told = complaint(error.lines)
+    assert told.count("\n") == 3
+    assert "\\x0a" not in told
+
+
+def test_a_row_that_a_guard_refuses_is_no_position_of_the_arm(site: Site, tmp_path: Path) -> None:
+    data = rows()
+    for k in (50, 60):
+        data[k][5] = 3.0  # the swing is elsewhere for one row
+    data[70][2] = 1.4  # a lever beyond its end says nothing of the arm
+    log = read_csv_log(site, write(tmp_path / "a.csv", data), LIMITS)
+    seen = dict(log.positions())
+    assert len(seen) == 198
+    assert all(q[0] == pytest.approx(0.1) for q in seen.values())
+    kept = [inputs for _, inputs in log.steps() if inputs.actuators]
+    assert len(kept) == 200  # the guard refuses it again, as it would live
+    jump, lever = log.warnings
+    assert "a.csv:52: a guard refuses this row (actuators: position_jump: actuator 0" in jump
+    assert "and 1 more for this reason" in jump
+    assert "a.csv:72: a guard refuses this row (joystick: axis_out_of_range" in lever
+    assert log.left_out == ()
