@@ -24,6 +24,14 @@ DEFINITIONS: Final = {
         "the arm's true motion, swept between samples with the guard's certificates, enters a"
         " zone; a re-entry within 0.5 s of leaving is the same crossing"
     ),
+    "not_monitoring": (
+        "the guard says NOT MONITORING: a crossing then, or at the moment at which it sees again,"
+        " is neither warned of nor missed, whoever forecasts; an alarm that is frozen meanwhile is"
+        " no warning, and begins anew afterwards; rates are of the rest of the time"
+    ),
+    "inside_at_first": (
+        "the arm was in the zone when the log began: no crossing, since nobody could warn of it"
+    ),
     "alarm": (
         "lives as the guard's published alerts do, whoever forecasts: it needs a cause in as many"
         " evaluations in a row as the site's alerts say, is held by a score a little below the"

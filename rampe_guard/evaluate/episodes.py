@@ -67,6 +67,21 @@ def contact_times(contacts: Iterable[Contact]) -> FloatArray:
     return np.array(times, dtype=np.float64).reshape(-1, 2)
 
 
+def inside_at_first_s(contacts: FloatArray, window: tuple[float, float]) -> float | None:
+    """How long the arm was inside a zone from the beginning of a window on [s], None if it was not.
+
+    Such a contact counts nowhere: nobody could have warned of it.
+
+    Args:
+        contacts: entry and leaving of each (c, 2) [s], joined and in order.
+        window: start and end [s].
+    """
+    begin_s, end_s = window
+    if not len(contacts) or contacts[0, 0] > begin_s:
+        return None
+    return float(min(contacts[0, 1], end_s)) - begin_s
+
+
 def alert_episodes(
     spans: Iterable[AlertSpan], zone: str, level: Level
 ) -> tuple[tuple[float, float], ...]:

@@ -23,9 +23,14 @@ from rampe_guard.evaluate.baselines import (
     proximity,
     traces,
 )
+from rampe_guard.evaluate.blindness import blind_s
 from rampe_guard.evaluate.crew import Findings
 from rampe_guard.evaluate.definitions import DEFINITIONS, GUARD, GUARDS, SPARING
-from rampe_guard.evaluate.episodes import alert_episodes, spans_from_transitions
+from rampe_guard.evaluate.episodes import (
+    alert_episodes,
+    inside_at_first_s,
+    spans_from_transitions,
+)
 from rampe_guard.evaluate.foretold import foretold
 from rampe_guard.evaluate.judging import (
     THRESHOLDS,
@@ -80,7 +85,10 @@ def report(found: Findings, machine: Machine) -> form.Report:
     skip = order.frozen or 0
     works, guards = found.works[skip:], found.guards[skip:]
     zones = judged_zones(machine)
-    truths = tuple(truth(w.name, zones, w.contacts, w.window) for w in works)
+    truths = tuple(
+        truth(w.name, zones, w.contacts, w.window, g.blind)
+        for w, g in zip(works, guards, strict=True)
+    )
     alerts = site.guard.alerts
     case = _Case(truths, alerts.warning_probability, manners(alerts))
     unit = _units(found, machine, zones)
@@ -108,6 +116,7 @@ def report(found: Findings, machine: Machine) -> form.Report:
         zones_left_out=tuple(n for n in machine.sweeper.zones if n not in zones),
         learned_from=tuple(w.name for w in found.works[:skip]),
         duration_s=sum(w.window[1] - w.window[0] for w in works),
+        not_monitoring_s=sum(blind_s(t.blind, t.window) for t in truths),
         crossings=forecasts[GUARD].operating_point.crossings,
         warning_probability=case.threshold,
         definitions=DEFINITIONS,
@@ -136,6 +145,8 @@ def report(found: Findings, machine: Machine) -> form.Report:
                 start_s=w.window[0],
                 duration_s=w.window[1] - w.window[0],
                 warnings=w.warnings,
+                not_monitoring_s=blind_s(t.blind, t.window),
+                not_monitoring=tuple((a, _or_none(b)) for a, b in t.blind.tolist()),
                 zones=_lines(t, g.trace, case),
             )
             for w, t, g in zip(works, truths, guards, strict=True)
@@ -229,7 +240,7 @@ def _published(
     for level in (Level.IMMINENT, Level.WARNING, Level.CAUTION):
         judged = [
             tuple(
-                judge(t.contacts[z], np.array(alert_episodes(s, zone, level)), t.window)
+                judge(t.contacts[z], np.array(alert_episodes(s, zone, level)), t.window, t.blind)
                 for z, zone in enumerate(t.zones)
             )
             for t, s in zip(truths, spans, strict=True)
@@ -300,6 +311,7 @@ def _lines(truth: Truth, trace: Trace, case: _Case) -> dict[str, form.ZoneLine]:
         alarms = zip(outcome.alarms.tolist(), outcome.verdict.tolist(), strict=True)
         lines[zone] = form.ZoneLine(
             contacts=tuple((a, _or_none(b)) for a, b in contacts.tolist()),
+            inside_at_first_s=inside_at_first_s(contacts, truth.window),
             alarms=tuple((a, _or_none(b), _VERDICTS[verdict]) for (a, b), verdict in alarms),
         )
     return lines
@@ -323,6 +335,7 @@ def _point(judged: Judged, threshold: float | None) -> form.Point:
         median_lead_s=found.median_lead_s,
         lead_5_percent_s=found.lead_5_percent_s,
         crossings=found.crossings,
+        unmonitored=found.unmonitored,
         missed=found.missed,
         alarms=found.alarms,
         false_alarms=found.false_alarms,

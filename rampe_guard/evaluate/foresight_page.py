@@ -8,7 +8,7 @@ from html import escape
 from rampe_guard.evaluate import page_charts as charts
 from rampe_guard.evaluate.definitions import GUARD
 from rampe_guard.evaluate.page_style import STYLE
-from rampe_guard.evaluate.report_model import Interval, Point, Report
+from rampe_guard.evaluate.report_model import Interval, LogLine, Point, Report
 
 _STRICTLY = (
     "Each alarm ends with its last cause, so that none earns credit by staying on: more alarms,"
@@ -47,7 +47,7 @@ def _headline(report: Report) -> str:
     at = report.forecasts[GUARD].operating_point
     rate, share = at.false_per_min_per_zone, at.warned_1_0_s
     if share is None or rate is None:
-        return "Nothing was touched in these logs, so there was nothing to warn of."
+        return _nothing(report)
     first = (
         f"Warned at least 1 s ahead of <b>{share:.0%}</b> of {at.crossings} crossings, with"
         f" <b>{rate:.1f}</b> false alarms a minute and zone."
@@ -60,6 +60,14 @@ def _headline(report: Report) -> str:
     return (
         f"{told} Alarmed no more of the time, {_peers(report, 'alarmed_share', at.alarmed_share)}."
     )
+
+
+def _nothing(report: Report) -> str:
+    when = " while the guard monitored" if report.not_monitoring_s > 0.0 else ""
+    inside = any(z.inside_at_first_s is not None for log in report.logs for z in log.zones.values())
+    if inside:
+        return f"No zone was entered{when} after the start, so there was nothing to warn of."
+    return f"Nothing was touched in these logs{when}, so there was nothing to warn of."
 
 
 def _peers(report: Report, cost: str, most: float) -> str:
@@ -82,14 +90,19 @@ def _peers(report: Report, cost: str, most: float) -> str:
 
 def _cards(report: Report) -> str:
     at = report.forecasts[GUARD].operating_point
-    cards = (
+    cards = [
         (f"{report.duration_s / 60:.1f} min", f"of work in {len(report.logs)} logs"),
         (str(at.crossings), f"crossings of {len(report.zones)} zones"),
         (_share(at.warned_0_5_s), "warned ≥ 0.5 s ahead"),
         (_share(at.warned_1_0_s), "warned ≥ 1 s ahead"),
         ("—" if at.median_lead_s is None else f"{at.median_lead_s:.2f} s", "median lead"),
         (str(report.published["caution"].total.missed), "without any alert before"),
-    )
+    ]
+    if report.not_monitoring_s > 0.0:
+        cards += [
+            (f"{report.not_monitoring_s:.1f} s", f"NOT MONITORING of {report.duration_s:.1f} s"),
+            (str(at.unmonitored), "crossings meanwhile, which no figure counts"),
+        ]
     told = "".join(f"<li><b>{escape(a)}</b><span>{escape(b)}</span></li>" for a, b in cards)
     known = escape(f"Knowledge {report.knowledge}.")
     return f"<ul class='cards'>{told}</ul><p class='small'>{known}</p>"
@@ -149,11 +162,23 @@ def _timelines(report: Report) -> str:
         "<span><i class='key false-alarm'></i>&times; false alarm</span>"
         "<span><i class='key undecided-alarm'></i>undecided at the end</span></p>"
     )
+    if report.not_monitoring_s > 0.0:
+        key += "<p class='legend'><span><i class='key blind'></i>not monitoring</span></p>"
     rows = "".join(
-        f"<h3>{escape(log.log)}</h3><div class='wide'>{charts.timeline(log)}</div>"
+        f"<h3>{escape(log.log)}</h3>{_inside(log)}<div class='wide'>{charts.timeline(log)}</div>"
         for log in report.logs
     )
     return _section("Every log", "The guard at its operating point.", key + rows)
+
+
+def _inside(log: LogLine) -> str:
+    told = ", ".join(
+        f"{zone} ({line.inside_at_first_s:.1f} s)"
+        for zone, line in log.zones.items()
+        if line.inside_at_first_s is not None
+    )
+    words = f"Inside from the start, which counts as no crossing: {told}."
+    return f"<p>{escape(words)}</p>" if told else ""
 
 
 def _tables(report: Report) -> str:

@@ -16,8 +16,10 @@ from rampe_guard.core.arrays import Arrays
 from rampe_guard.core.config import AlertConfig
 from rampe_guard.core.events import SYSTEM_ZONE, AlertEvent, SweepSummary
 from rampe_guard.core.guard import Guard
+from rampe_guard.core.monitor import Status
 from rampe_guard.core.risk import HORIZONS_S, ZoneRisk
-from rampe_guard.core.types import Certificate
+from rampe_guard.core.types import Certificate, FloatArray
+from rampe_guard.evaluate.blindness import Blindness
 from rampe_guard.evaluate.trace import Mask, Trace, lowered
 from rampe_guard.runtime.replay import Steps
 
@@ -34,12 +36,14 @@ class GuardRun:
         certain: what of its floor holds whatever the site's settings (k, z): the arm will touch
             whatever the operator does, is inside, or nothing is known.
         transitions: its published alerts: time [s], zone, level; in order.
+        blind: spans in which it did not monitor (b, 2) [s].
         knowledge: what it knows in the end.
     """
 
     trace: Trace
     certain: Mask
     transitions: tuple[tuple[float, str, Level], ...]
+    blind: FloatArray
     knowledge: Knowledge
 
 
@@ -73,19 +77,20 @@ def guard_trace(
     transitions: list[tuple[float, str, Level]] = []
     shown: dict[str, Level] = {}
     last: tuple[ZoneRisk, ...] = ()
+    blindness = Blindness()
     for now_s, inputs in log.steps():
         events = guard.step(inputs, now_s)
-        if inputs.actuators:
-            told = guard.snapshot(now_s)
-            if told.risks is not last:
-                last = told.risks
-                notes.take(now_s, last, _floors(told.sweeps, last, alerts, shown))
+        told = guard.snapshot(now_s)
+        blindness.take(now_s, monitoring=told.health.status is not Status.NOT_MONITORING)
+        if inputs.actuators and told.risks is not last:
+            last = told.risks
+            notes.take(now_s, last, _floors(told.sweeps, last, alerts, shown))
         for event in events:
             if isinstance(event, AlertEvent) and event.zone != SYSTEM_ZONE:
                 transitions.append((now_s, event.zone, event.level))
                 shown[event.zone] = event.level
     known = {**guard.rampe.snapshot(), **guard.situations.snapshot()}
-    return GuardRun(notes.trace(), notes.certain(), tuple(transitions), known)
+    return GuardRun(notes.trace(), notes.certain(), tuple(transitions), blindness.spans, known)
 
 
 @dataclass(frozen=True, slots=True)

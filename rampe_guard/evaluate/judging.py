@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
 
 from rampe_guard.core.types import FloatArray
+from rampe_guard.evaluate.blindness import NEVER
 from rampe_guard.evaluate.episodes import Contact, contact_episodes, contact_times
 from rampe_guard.evaluate.outcome import Outcome, judge
 from rampe_guard.evaluate.points import Figures, Pool, Spread, figures, pool, spread
@@ -27,20 +28,33 @@ RATES: Final = (0.5, 1.0, 2.0, 3.0)
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """What truly happened in one log: contacts of each zone (c, 2) [s], and its window [s]."""
+    """What truly happened in one log.
+
+    Attributes:
+        name: of the log.
+        zones: names.
+        contacts: of each zone (c, 2) [s].
+        window: first and last position [s].
+        blind: spans in which a guard did not monitor (b, 2) [s]; nobody is judged there.
+    """
 
     name: str
     zones: tuple[str, ...]
     contacts: tuple[FloatArray, ...]
     window: tuple[float, float]
+    blind: FloatArray = field(default_factory=lambda: NEVER)
 
 
 def truth(
-    name: str, zones: tuple[str, ...], contacts: Sequence[Contact], window: tuple[float, float]
+    name: str,
+    zones: tuple[str, ...],
+    contacts: Sequence[Contact],
+    window: tuple[float, float],
+    blind: FloatArray = NEVER,
 ) -> Truth:
     """Join the contacts of each zone."""
     joined = tuple(contact_times(contact_episodes(contacts, zone)) for zone in zones)
-    return Truth(name, zones, joined, window)
+    return Truth(name, zones, joined, window, blind)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +77,7 @@ class Judged:
 def outcomes(truth: Truth, trace: Trace, threshold: float, how: Manners) -> tuple[Outcome, ...]:
     """What became of the alarms of a trace, zone by zone."""
     return tuple(
-        judge(truth.contacts[z], alarms(trace, z, threshold, how), truth.window)
+        judge(truth.contacts[z], alarms(trace, z, threshold, how), truth.window, truth.blind)
         for z in range(len(truth.zones))
     )
 

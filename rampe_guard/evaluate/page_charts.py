@@ -134,6 +134,10 @@ def timeline(log: LogLine) -> str:
         top=4.0,
         bottom=30.0,
     )
+    for start, end in log.not_monitoring:
+        until = log.duration_s if end is None else end - log.start_s
+        first, last = (min(max(at, 0.0), log.duration_s) for at in (start - log.start_s, until))
+        chart.box((first, 0.0), (last, float(len(zones))), "blind")
     for index, zone in enumerate(zones):
         base = len(zones) - 1 - index
         chart.words((0.0, base + 0.36), zone, "row", "end", (-8.0, 0.0))

@@ -52,6 +52,7 @@ text.caution{fill:var(--usual)}text.warning{fill:var(--ours)}text.imminent{fill:
 .mark.stopping{fill:none;stroke:var(--stopping);stroke-width:.5}
 .bar{fill:var(--soft)}.bar.ours{fill:var(--ours)}
 .contact{fill:var(--contact);background:var(--contact)}
+.blind{fill:#8b008b;background:#8b008b;opacity:.3}
 .true-alarm{fill:var(--true);background:var(--true)}
 .false-alarm{fill:var(--false);background:var(--false)}
 .undecided-alarm{fill:none;stroke:var(--soft);stroke-dasharray:3 2;border:1px dashed var(--soft)}

@@ -9,12 +9,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from rampe_guard.core.types import FloatArray
+from rampe_guard.evaluate.blindness import blind_s
 from rampe_guard.evaluate.outcome import FALSE, UNDECIDED, Outcome
 
 LEADS_S: Final = (0.5, 1.0, 1.5, 2.0)
@@ -36,11 +38,12 @@ class Pool:
         lead_s: lead time of each contact (c,) [s], nan where missed.
         contact_block: the block that each contact lies in (c,).
         false_block: the block in which each false alarm began (f,).
-        minutes: zone minutes of each block (b,).
+        minutes: monitored zone minutes of each block (b,).
         alarms: all alarms.
         undecided: those that the end of a log kept from being true or false.
         outside_s: time outside contact, summed over zones [s].
         alarmed_s: how much of that an alarm was on [s].
+        unmonitored: contacts that came while the guard did not monitor; in none of the above.
     """
 
     lead_s: FloatArray
@@ -51,6 +54,7 @@ class Pool:
     undecided: int
     outside_s: float
     alarmed_s: float
+    unmonitored: int = 0
 
 
 def block_count(window: tuple[float, float]) -> int:
@@ -72,7 +76,7 @@ def pool(logs: Iterable[Sequence[Outcome]]) -> Pool:
     contact_block: list[IntArray] = []
     false_block: list[IntArray] = []
     minutes: list[FloatArray] = []
-    alarms = undecided = first = 0
+    alarms = undecided = unmonitored = first = 0
     outside_s = alarmed_s = 0.0
     for zones in logs:
         if not zones:
@@ -88,7 +92,8 @@ def pool(logs: Iterable[Sequence[Outcome]]) -> Pool:
             outside_s += outcome.outside_s
             alarmed_s += outcome.alarmed_s
             undecided += int((outcome.verdict == UNDECIDED).sum())
-        minutes.append(np.full(count, (window[1] - window[0]) / count * len(zones) / 60.0))
+            unmonitored += outcome.unmonitored
+        minutes.append(_watched_s(window, zones[0].blind) * len(zones) / 60.0)
         first += count
     return Pool(
         lead_s=_floats(leads),
@@ -99,7 +104,16 @@ def pool(logs: Iterable[Sequence[Outcome]]) -> Pool:
         undecided=undecided,
         outside_s=outside_s,
         alarmed_s=alarmed_s,
+        unmonitored=unmonitored,
     )
+
+
+def _watched_s(window: tuple[float, float], blind: FloatArray) -> FloatArray:
+    """Monitored time of each block of a window (b,) [s]."""
+    count = block_count(window)
+    length_s = (window[1] - window[0]) / count
+    edges = [window[0] + length_s * k for k in range(count + 1)]
+    return length_s - np.array([blind_s(blind, block) for block in pairwise(edges)])
 
 
 def _floats(parts: Sequence[FloatArray]) -> FloatArray:
@@ -115,7 +129,7 @@ class Figures:
     """The figures of one pool; None where there is nothing to reckon from.
 
     Attributes:
-        crossings: contacts that count.
+        crossings: contacts that came while the guard monitored.
         missed: those without an alarm before them.
         warned: share of all contacts warned of at least each of `LEADS_S` ahead.
         median_lead_s: median lead time of the warned contacts [s].
@@ -123,9 +137,10 @@ class Figures:
         alarms: alarm episodes.
         false_alarms: those without a contact.
         undecided: those that the end of a log kept from being true or false.
-        zone_minutes: time watched, summed over zones [min].
+        zone_minutes: time in which the guard monitored, summed over zones [min].
         false_per_min_per_zone: [1/min].
         alarmed_share: share of the time outside contact that an alarm was on.
+        unmonitored: contacts that came while it did not.
     """
 
     crossings: int
@@ -139,6 +154,7 @@ class Figures:
     zone_minutes: float
     false_per_min_per_zone: float | None
     alarmed_share: float | None
+    unmonitored: int = 0
 
 
 def figures(of: Pool) -> Figures:
@@ -160,6 +176,7 @@ def figures(of: Pool) -> Figures:
         zone_minutes=minutes,
         false_per_min_per_zone=len(of.false_block) / minutes if minutes > 0.0 else None,
         alarmed_share=of.alarmed_s / of.outside_s if of.outside_s > 0.0 else None,
+        unmonitored=of.unmonitored,
     )
 
 

@@ -18,7 +18,10 @@ Interval = Annotated[
 
 Leads = Annotated[
     tuple[float | None, ...],
-    Meta(description="Lead time of every crossing, by log, zone and time [s]; null: missed."),
+    Meta(
+        description="Lead time of every crossing that came while the guard monitored, by log, zone"
+        " and time [s]; null: missed."
+    ),
 ]
 
 
@@ -84,14 +87,26 @@ class Point(Part, frozen=True, kw_only=True):
     lead_5_percent_s: Annotated[
         float | None, Meta(description="95 % of the warned crossings have at least this [s].")
     ]
-    crossings: Annotated[int, Meta(description="Contacts of the motion that really happened.")]
+    crossings: Annotated[
+        int,
+        Meta(description="Contacts of the motion that really happened, while the guard monitored."),
+    ]
+    unmonitored: Annotated[
+        int,
+        Meta(
+            description="Contacts while the guard said NOT MONITORING: neither warned of nor"
+            " missed, and in no other figure."
+        ),
+    ]
     missed: Annotated[int, Meta(description="Crossings without any alarm before them.")]
     alarms: Annotated[int, Meta(description="Alarm episodes.")]
     false_alarms: Annotated[int, Meta(description="Alarms without a crossing.")]
     undecided: Annotated[
         int, Meta(description="Alarms that the end of a log kept from being true or false.")
     ]
-    zone_minutes: Annotated[float, Meta(description="Time watched, summed over zones [min].")]
+    zone_minutes: Annotated[
+        float, Meta(description="Time in which the guard monitored, summed over zones [min].")
+    ]
     strict: Annotated[
         Strict | None,
         Meta(description="With alarms that end with their last cause; null of published alerts."),
@@ -168,6 +183,13 @@ class ZoneLine(Part, frozen=True, kw_only=True):
         tuple[tuple[float, float | None], ...],
         Meta(description="Entry and leaving [s]; null: still in at the end."),
     ]
+    inside_at_first_s: Annotated[
+        float | None,
+        Meta(
+            description="How long the arm was inside from the first position on [s]; null: it was"
+            " not. That is the first of the contacts, and counts as no crossing."
+        ),
+    ]
     alarms: Annotated[
         tuple[tuple[float, float | None, str], ...],
         Meta(
@@ -184,6 +206,11 @@ class LogLine(Part, frozen=True, kw_only=True):
     start_s: Annotated[float, Meta(description="Time of its first position [s].")]
     duration_s: Annotated[float, Meta(description="From the first position to the last [s].")]
     warnings: Annotated[tuple[str, ...], Meta(description="What was wrong with it.")]
+    not_monitoring_s: Annotated[float, Meta(description="How long the guard did not monitor [s].")]
+    not_monitoring: Annotated[
+        tuple[tuple[float, float | None], ...],
+        Meta(description="When: start and end [s]; null: to the end."),
+    ]
     zones: dict[str, ZoneLine]
 
 
@@ -220,7 +247,12 @@ class Report(Part, frozen=True, kw_only=True):
         tuple[str, ...], Meta(description="Logs that only taught, with --frozen; not judged.")
     ]
     duration_s: Annotated[float, Meta(description="Of all judged logs [s].")]
-    crossings: Annotated[int, Meta(description="Contacts in all judged logs.")]
+    not_monitoring_s: Annotated[
+        float, Meta(description="How much of it the guard did not monitor [s].")
+    ]
+    crossings: Annotated[
+        int, Meta(description="Contacts in all judged logs, while the guard monitored.")
+    ]
     warning_probability: Annotated[
         float, Meta(description="The site's: threshold of the operating points.")
     ]

@@ -8,12 +8,17 @@ Definitions, for one zone and one level (an alert counts if it is at this level 
 - *alarm*: an episode of alerts, joined across silence of up to 0.5 s, that touches the window.
 - *warned*: an alarm began before the entry, and was on at the entry or had ended at most
   0.5 s before it. There is at most one such alarm. *Missed*: not warned.
+- *not monitored*: a contact that came while the guard said NOT MONITORING, or at the moment
+  at which it saw again. It is neither warned nor missed. An alert that was frozen meanwhile is no
+  warning: it begins anew when the guard sees again. Whether it was false is judged as if it had
+  been on all the time, since it was shown.
 - *lead time*: entry less the start of that alarm; where an earlier contact lies within the
   alarm, less the time that contact was left, so that one long alarm earns no credit twice.
 - *false alarm*: no contact overlaps the alarm or the 0.5 s after it. An alarm that is still
   on 0.5 s before the end of the window and has no contact yet is *undecided*, not false.
 
-Shares are of all contacts: a missed one counts as not early enough.
+Shares are of all contacts that came while the guard monitored: a missed one counts as not early
+enough. Rates are of the time in which it did.
 """
 
 from __future__ import annotations
@@ -26,6 +31,8 @@ from statistics import median
 import numpy as np
 
 from rampe_guard.core.alarm import Level
+from rampe_guard.core.types import FloatArray
+from rampe_guard.evaluate.blindness import NEVER
 from rampe_guard.evaluate.episodes import (
     AlertSpan,
     Contact,
@@ -33,7 +40,7 @@ from rampe_guard.evaluate.episodes import (
     contact_episodes,
     contact_times,
 )
-from rampe_guard.evaluate.outcome import FALSE, UNDECIDED, judge
+from rampe_guard.evaluate.outcome import FALSE, UNDECIDED, judge, watched_minutes
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +55,8 @@ class LevelScore:
         false_alarms: those without a contact.
         undecided: those that the end of the window kept from being true or false.
         unknown_contacts: contacts that rest on a sweep without an answer.
-        zone_minutes: time watched [min], summed over zones.
+        zone_minutes: time in which the guard monitored [min], summed over zones.
+        unmonitored: contacts that came while it did not; neither warned nor missed.
     """
 
     level: Level
@@ -59,6 +67,7 @@ class LevelScore:
     undecided: int
     unknown_contacts: int
     zone_minutes: float
+    unmonitored: int = 0
 
     @property
     def warned(self) -> int:
@@ -67,7 +76,7 @@ class LevelScore:
 
     @property
     def contacts(self) -> int:
-        """All contacts counted."""
+        """All contacts that came while the guard monitored."""
         return self.warned + self.missed
 
     @property
@@ -92,8 +101,11 @@ def score_zone(
     zone: str,
     level: Level,
     window_s: tuple[float, float],
+    blind: FloatArray = NEVER,
 ) -> LevelScore:
     """Score one zone at one level over ``window_s`` (start, end) [s].
+
+    ``blind`` are the spans in which the guard did not monitor (b, 2) [s].
 
     Raises:
         ValueError: the window ends before it starts.
@@ -103,7 +115,7 @@ def score_zone(
         raise ValueError(f"window ends at {end_s} s, before it starts at {begin_s} s")
     entries = contact_episodes(contacts, zone)
     alarms = np.array(alert_episodes(spans, zone, level)).reshape(-1, 2)
-    found = judge(contact_times(entries), alarms, window_s)
+    found = judge(contact_times(entries), alarms, window_s, blind)
     leads = found.lead_s.tolist()
     return LevelScore(
         level=level,
@@ -113,7 +125,8 @@ def score_zone(
         false_alarms=int((found.verdict == FALSE).sum()),
         undecided=int((found.verdict == UNDECIDED).sum()),
         unknown_contacts=sum(c.unknown for c in entries if begin_s < c.entered_s <= end_s),
-        zone_minutes=(end_s - begin_s) / 60.0,
+        zone_minutes=watched_minutes(window_s, blind),
+        unmonitored=found.unmonitored,
     )
 
 
@@ -123,9 +136,10 @@ def score(
     zones: Iterable[str],
     level: Level,
     window_s: tuple[float, float],
+    blind: FloatArray = NEVER,
 ) -> dict[str, LevelScore]:
     """Score every zone at one level; see `total` for all of them together."""
-    return {zone: score_zone(contacts, spans, zone, level, window_s) for zone in zones}
+    return {zone: score_zone(contacts, spans, zone, level, window_s, blind) for zone in zones}
 
 
 def total(scores: Iterable[LevelScore]) -> LevelScore:
@@ -147,4 +161,5 @@ def total(scores: Iterable[LevelScore]) -> LevelScore:
         undecided=sum(part.undecided for part in parts),
         unknown_contacts=sum(part.unknown_contacts for part in parts),
         zone_minutes=sum(part.zone_minutes for part in parts),
+        unmonitored=sum(part.unmonitored for part in parts),
     )

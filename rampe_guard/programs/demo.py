@@ -38,6 +38,8 @@ from rampe_guard.view.watch import watch
 
 _END_S = 3.0
 _SCORE_S = 0.035
+_TRUSTED_S = 1.0
+"""A guard without a heartbeat for longer does not monitor [s]."""
 _AFTERMATH_S = 0.3
 """How long the guard may still speak after the operator has gone home [s]."""
 
@@ -126,6 +128,7 @@ class _Score:
     needed: Sequence[subprocess.Popen[bytes]]
     loop_ms: wire.Quantiles | None = None
     _last_s: float = float("-inf")
+    _trusted_s: float = float("inf")
     _over_s: float | None = None
 
     def take(self, heard: list[Heard]) -> bool:
@@ -138,10 +141,21 @@ class _Score:
                 self.tally.alert(message.published_unix_s, message.zone, level)
             elif isinstance(message, wire.Heartbeat):
                 self.loop_ms = message.loop_ms or self.loop_ms
+                self._beat(message)
+        if self._last_s > self._trusted_s:
+            self.tally.status(self._trusted_s, monitoring=False)
         _check_alive(self.needed)
         if self._over_s is None and _gone_home(self.operator):
             self._over_s = time.monotonic()
         return self._over_s is not None and time.monotonic() - self._over_s > _AFTERMATH_S
+
+    def _beat(self, beat: wire.Heartbeat) -> None:
+        """Whether the guard watches; who keeps silent longer than he may does not."""
+        told_s = beat.published_unix_s
+        if told_s > self._trusted_s:
+            self.tally.status(self._trusted_s, monitoring=False)
+        self.tally.status(told_s, monitoring=beat.status != "not_monitoring")
+        self._trusted_s = told_s + _TRUSTED_S
 
     def _position(self, stamp_s: float, position: Sequence[float]) -> None:
         # swept from sample to sample, so a coarser step misses nothing

@@ -6,7 +6,7 @@ import json
 import os
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -170,6 +170,8 @@ def _write(found: Findings, out: Path) -> Report:
 
 def _show(made: Report, found: Findings, out: Path, console: Console) -> None:
     console.print(_table(made))
+    for words in _outside_the_figures(made):
+        console.print(Text(words, "yellow"))
     console.print(Text(""))
     for part in prediction_summary(load_site(found.order.site), found.prediction):
         console.print(part)
@@ -209,6 +211,24 @@ def _table(made: Report) -> Table:
     for level, of in made.published.items():
         table.add_row(f"published, {level} or above", *_cells(of.total), style="dim")
     return table
+
+
+def _outside_the_figures(made: Report) -> Iterator[str]:
+    """What no figure of the table counts: when the guard was blind, where the arm began inside."""
+    if made.not_monitoring_s > 0.0:
+        at = made.forecasts[GUARD].operating_point
+        yield (
+            f"NOT MONITORING {made.not_monitoring_s:.1f} of {made.duration_s:.1f} s:"
+            f" {at.unmonitored} crossings came meanwhile, neither warned of nor missed"
+        )
+    for log in made.logs:
+        inside = ", ".join(
+            f"{zone} ({line.inside_at_first_s:.1f} s)"
+            for zone, line in log.zones.items()
+            if line.inside_at_first_s is not None
+        )
+        if inside:
+            yield f"{log.log}: inside from the start, which counts as no crossing: {inside}"
 
 
 def _cells(at: Point | Strict) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ from rampe_guard import wire
 from rampe_guard.assembly import Machine
 from rampe_guard.core.events import SYSTEM_ZONE, AlertEvent
 from rampe_guard.core.guard import Guard
+from rampe_guard.core.monitor import Status
 from rampe_guard.errors import InterruptedReplayError, LogError, MessageError, ModelFileError
 from rampe_guard.evaluate.tally import Tally
 from rampe_guard.programs.scoring import closing_table
@@ -136,7 +137,9 @@ def _not_used(log: McapLog, why: str) -> None:
 
 def _moved(machine: Machine, log: Log, stop: StopFlag) -> Tally:
     """A tally that has seen where the arm truly was."""
-    tally, seen = Tally(machine.sweeper, machine.sweeper.zones), False
+    moving = {item.name for item in machine.site.scene.moving}
+    still = tuple(zone for zone in machine.sweeper.zones if zone not in moving)
+    tally, seen = Tally(machine.sweeper, still), False
     for t, q in log.positions():
         if stop():
             raise InterruptedReplayError("interrupted: no score")
@@ -162,6 +165,8 @@ def _lines(
     for now_s, events in replay(guard, log):
         if stop():
             raise InterruptedReplayError("interrupted: the alerts are not complete, no score")
+        status = guard.snapshot(now_s).health.status
+        tally.status(now_s, monitoring=status is not Status.NOT_MONITORING)
         for event in events:
             if not isinstance(event, AlertEvent):
                 continue

@@ -21,8 +21,18 @@ def closing_table(
         loop_ms: loop times of the guard, None where there is no loop.
     """
     zones = [
-        ZoneTally(zone, s.contacts, s.leads_s, s.false_alarms, s.unknown_contacts)
+        ZoneTally(zone, s.contacts, s.leads_s, s.false_alarms, s.unknown_contacts, s.unmonitored)
         for zone, s in tally.scores(Level.WARNING).items()
     ]
     p50, p99 = (loop_ms.p50, loop_ms.p99) if loop_ms else (None, None)
-    return summary(Summary(zones, tally.duration_s, cycles, p50, p99))
+    return summary(
+        Summary(
+            zones,
+            tally.duration_s,
+            cycles,
+            p50,
+            p99,
+            blind_s=tally.blind_s,
+            inside_at_first_s=tally.inside_at_first_s,
+        )
+    )

@@ -53,6 +53,28 @@ def test_a_run_without_contacts_claims_nothing() -> None:
     assert "shows nothing about warning" in text
 
 
+def test_contacts_while_blind_are_their_own_column_and_nobody_claims_all() -> None:
+    zones = [ZoneTally("wall", 3, (0.6, 0.5, 0.4), 1, unmonitored=2), ZoneTally("roof", 0, (), 0)]
+    text = shown(Summary(zones, duration_s=120.0, blind_s=60.0))
+    assert row(text, "wall") == "wall 3 3 0 0.40 s 0.50 s 0.60 s 1 2"
+    assert row(text, "all") == "all 3 3 0 0.40 s 0.50 s 0.60 s 1 2"
+    said = " ".join(text.split())
+    assert "All 3 contacts that came while the guard monitored were warned of" in said
+    assert "NOT MONITORING 60.0 of 120.0 s: 2 more contacts came meanwhile" in said
+    assert "0.50 false alarms per minute and zone" in said  # of the time in which it monitored
+    calm = shown(Summary([ZoneTally("wall", 0, (), 0)], duration_s=120.0, blind_s=0.2))
+    assert row(calm, "wall") == "wall 0 0 0 — — — 0"
+    assert "NOT MONITORING 0.2 of 120.0 s\n" in calm.replace(" \n", "\n")
+    assert "NOT MONITORING" not in shown(Summary(zones, duration_s=120.0))
+
+
+def test_zones_that_the_arm_began_in_are_named() -> None:
+    run = Summary([ZoneTally("wall", 0, (), 0)], 60.0, inside_at_first_s={"wall": 3.21, "a": 60.0})
+    said = " ".join(shown(run).split())
+    assert "no contact: wall (3.2 s), a (60.0 s, to the end)" in said
+    assert "entered no keep-out margin after the start" in said
+
+
 def test_contacts_without_an_answer_are_told() -> None:
     text = shown(Summary([ZoneTally("wall", 1, (0.5,), 0, unknown_contacts=1)], duration_s=60.0))
     assert "1 contacts rest on sweeps without an answer" in text
