@@ -107,7 +107,8 @@ def work(voice: Json | Ros2) -> None:
         voice.positions(position.tolist(), now_s, cut=cut)
         state = step(machine, state, lever, 1.0 / _RATE_HZ)
         count += 1
-        due_s += 1.0 / _RATE_HZ
+        # a process that was kept waiting stood still: no machine makes up for lost time
+        due_s = max(due_s + 1.0 / _RATE_HZ, time.monotonic())
         time.sleep(max(0.0, due_s - time.monotonic()))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 import shutil
 from collections.abc import Iterable
 from pathlib import Path
@@ -21,6 +22,20 @@ ACTUATORS = (
 )
 """What the machine is like; the levers stand in another order than the actuators."""
 LIMITS = ((-2.5, 2.5), (-0.5, 1.2), (0.0, 0.5))
+
+
+LEVERS = {a.name: (a.axis, a.sign) for a in ACTUATORS}
+
+
+def told_levers(site: Path) -> dict[str, tuple[int, int]]:
+    """Axis and sign of each actuator of which a site file says that they were measured."""
+    told = {}
+    for block in site.read_text("utf-8").split("    - name: ")[1:]:
+        lines = dict(re.findall(r"^ +(axis|sign): (.*)$", block, re.MULTILINE))
+        if "TODO" not in lines["axis"] + lines["sign"]:
+            axis, sign = (int(lines[name].split()[0]) for name in ("axis", "sign"))
+            told[block.split()[0]] = axis, sign
+    return told
 
 
 def machine() -> Machine:
