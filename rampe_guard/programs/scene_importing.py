@@ -13,7 +13,8 @@ import numpy as np
 from rampe_guard.core.rotation import rotation_of_rpy
 from rampe_guard.core.types import FloatArray
 from rampe_guard.errors import SettingsError
-from rampe_guard.scene_tools.cloud import CloudWishes, import_cloud
+from rampe_guard.runtime.loading import StatusLine, say_to_stderr
+from rampe_guard.scene_tools.cloud import CloudWishes, Tell, import_cloud
 from rampe_guard.scene_tools.cloud_read import has_faces
 from rampe_guard.scene_tools.draft import Common, Draft, Names
 from rampe_guard.scene_tools.meshes import Up, import_mesh
@@ -47,6 +48,7 @@ _MEANT_FOR: Final = {
 DEFAULT_VOXEL_M: Final = 0.1
 DEFAULT_OBJECTS: Final = 300
 _ARM_STEP: Final = 0.25
+_TOLD_AGAIN_S: Final = 10.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,15 +102,23 @@ def import_scene(wishes: Wishes) -> int:
     pose[:3, :3], pose[:3, 3] = rotation_of_rpy(wishes.rpy), wishes.xyz
     own = wishes.margin_m if wishes.append else None  # else the whole scene has it
     common = Common(pose, own, tuple(wishes.ignore_link))
-    draft = _draft(kind, wishes, names, common, MAX_OBJECTS - len(old))
     margin_m = wishes.margin_m or 0.0
-    scene = write_scene(draft, target, source=Path(wishes.file).name, margin_m=margin_m)
-    for note in draft.notes:
-        sys.stderr.write(f"note: {note}\n")
+    line = StatusLine(sys.stderr, say_to_stderr, again_s=_TOLD_AGAIN_S)
+    line.show(f"{wishes.file}: reading", at_once=True)
+    try:
+        draft = _draft(kind, wishes, names, common, MAX_OBJECTS - len(old), line.show)
+        line.clear()  # what was found is worth knowing before it is written, and if it cannot be
+        for note in draft.notes:
+            sys.stderr.write(f"note: {note}\n")
+        line.show(f"{wishes.out}: checking and writing", at_once=True)
+        scene = write_scene(draft, target, source=Path(wishes.file).name, margin_m=margin_m)
+    finally:
+        line.clear()
     if not wishes.append and not margin_m:
         sys.stderr.write("note: margin_m is 0, so only touching is contact; give --margin-m\n")
     added = f", {len(scene.objects)} in all" if old else ""
-    sys.stdout.write(f"{wishes.out}: {len(draft.objects)} objects from {wishes.file}{added}\n")
+    count = "1 object" if len(draft.objects) == 1 else f"{len(draft.objects)} objects"
+    sys.stdout.write(f"{wishes.out}: {count} from {wishes.file}{added}\n")
     return 0
 
 
@@ -145,7 +155,7 @@ def _target(wishes: Wishes) -> Target:
     return Target(path, None, folders)
 
 
-def _draft(kind: str, wishes: Wishes, names: Names, common: Common, room: int) -> Draft:
+def _draft(kind: str, wishes: Wishes, names: Names, common: Common, room: int, tell: Tell) -> Draft:
     file, name = Path(wishes.file), wishes.name
     prefix = f"{name}-" if name else ""
     match kind:
@@ -162,7 +172,8 @@ def _draft(kind: str, wishes: Wishes, names: Names, common: Common, room: int) -
             return import_plan(
                 file, names, common, prefix=prefix, origin=origin, metres=wishes.metres
             )
-    return import_cloud(file, names, common, _cloud_wishes(wishes, room), name=name)
+    wanted = _cloud_wishes(wishes, room)
+    return import_cloud(file, names, common, wanted, name=name, tell=tell)
 
 
 def _cloud_wishes(wishes: Wishes, room: int) -> CloudWishes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Callable
@@ -20,12 +21,60 @@ _PERIOD_S = 0.1
 _CLEAR = "\r\x1b[K"
 
 
-class BuildLine:
-    """Says how far the shapes of meshes are; called as `Progress`.
+class StatusLine:
+    """What a command that takes long does now.
 
-    On a terminal it is one line, overwritten and in the end cleared. Elsewhere it is one line
-    for each mesh that takes long.
+    On a terminal it is one line, overwritten and in the end cleared. Elsewhere it is a sentence
+    once that has taken long, and then again now and then.
     """
+
+    def __init__(
+        self,
+        out: TextIO,
+        say: Callable[[str], None],
+        clock: Callable[[], float] = time.monotonic,
+        again_s: float = math.inf,
+    ) -> None:
+        """Write to ``out`` if it is a terminal, else ``say`` a sentence, and again_s [s] later."""
+        self._out, self._say, self._clock, self._again_s = out, say, clock, again_s
+        self._terminal = out.isatty()
+        self._began_s: float | None = None
+        self._shown_s: float | None = None
+
+    def show(self, text: str, *, more: str = "", at_once: bool = False) -> None:
+        """Take that ``text`` is done now.
+
+        Args:
+            text: a few words.
+            more: said behind them where there is room for sentences.
+            at_once: a terminal shows it without waiting whether it takes long.
+        """
+        now_s = self._clock()
+        if self._began_s is None:
+            self._began_s = now_s
+        since_s = now_s - self._began_s
+        if not self._terminal:
+            if since_s > LONG_S and not self._just_shown(now_s, self._again_s):
+                self._shown_s = now_s
+                self._say(f"{text}{more}")
+        elif at_once or (since_s > FLICKER_S and not self._just_shown(now_s, _PERIOD_S)):
+            self._shown_s = now_s
+            self._out.write(f"{_CLEAR}{text}")
+            self._out.flush()
+
+    def _just_shown(self, now_s: float, period_s: float) -> bool:
+        return self._shown_s is not None and now_s - self._shown_s < period_s
+
+    def clear(self) -> None:
+        """Wipe the line, and be ready for the next work."""
+        if self._terminal and self._shown_s is not None:
+            self._out.write(_CLEAR)
+            self._out.flush()
+        self._began_s = self._shown_s = None
+
+
+class BuildLine:
+    """Says how far the shapes of meshes are, each anew; called as `Progress`."""
 
     def __init__(
         self,
@@ -34,36 +83,19 @@ class BuildLine:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """Write to ``out`` if it is a terminal, else call ``say`` with a sentence."""
-        self._out, self._say, self._clock = out, say, clock
-        self._terminal = out.isatty()
-        self._began_s: float | None = None
-        self._shown_s: float | None = None
+        self._line = StatusLine(out, say, clock)
 
     def __call__(self, what: str, share: float) -> None:
         """Take that ``what`` is done, and which ``share`` of its mesh, from 0 to 1."""
-        now_s = self._clock()
         if share >= 1.0:
             self.clear()
             return
-        if self._began_s is None:
-            self._began_s = now_s
-        since_s = now_s - self._began_s
         text = f"{what}: {share:.0%}".replace("%", " %")
-        if not self._terminal:
-            if since_s > LONG_S and self._shown_s is None:
-                self._shown_s = now_s
-                self._say(f"{text}; a mesh that was wrapped is kept for the next start")
-        elif since_s > FLICKER_S and (self._shown_s is None or now_s - self._shown_s >= _PERIOD_S):
-            self._shown_s = now_s
-            self._out.write(f"{_CLEAR}{text}")
-            self._out.flush()
+        self._line.show(text, more="; a mesh that was wrapped is kept for the next start")
 
     def clear(self) -> None:
         """Wipe the line, and be ready for the next mesh."""
-        if self._terminal and self._shown_s is not None:
-            self._out.write(_CLEAR)
-            self._out.flush()
-        self._began_s = self._shown_s = None
+        self._line.clear()
 
 
 def say_to_stderr(text: str) -> None:

@@ -7,7 +7,7 @@ own, lone voxels, points that are no numbers. Nothing else is.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -18,8 +18,9 @@ from rampe_guard.core.types import FloatArray
 from rampe_guard.errors import GeometryError
 from rampe_guard.scene_tools.cloud_read import read_points
 from rampe_guard.scene_tools.draft import Common, Draft, DraftObject, Names, placed, plain
-from rampe_guard.scene_tools.voxels import MOST, Voxels, alone, boxes, coarser, gather
+from rampe_guard.scene_tools.voxels import MOST, Index, Voxels, alone, boxes, coarser, gather
 
+Tell = Callable[[str], None]
 LEAST_VOXEL_M: Final = 0.005
 GRAIN_M: Final = 1e-4
 """Boxes are rounded outwards to this, and grown by it, so that no point lies on a face [m]."""
@@ -70,7 +71,13 @@ class _Counts:
 
 
 def import_cloud(
-    file: Path, names: Names, common: Common, wishes: CloudWishes, *, name: str | None = None
+    file: Path,
+    names: Names,
+    common: Common,
+    wishes: CloudWishes,
+    *,
+    name: str | None = None,
+    tell: Tell = lambda _: None,
 ) -> Draft:
     """Boxes that hold every point of a cloud.
 
@@ -80,13 +87,15 @@ def import_cloud(
         common: pose, margin, links.
         wishes: how.
         name: with which the names of the objects begin; the file's if left out.
+        tell: takes words on what is done now.
 
     Raises:
         GeometryError: naming the file and what is wrong with it.
     """
     counts = _Counts(str(file))
     try:
-        voxels = gather(_wanted(read_points(file), common.pose, wishes, counts), wishes.voxel_m)
+        pieces = _counted(read_points(file), str(file), tell)
+        voxels = gather(_wanted(pieces, common.pose, wishes, counts), wishes.voxel_m)
     except ValueError:
         raise GeometryError(
             f"{file}: spans more than {2 * MOST} voxels of {wishes.voxel_m:g} m; give --crop, a"
@@ -106,11 +115,20 @@ def import_cloud(
     voxels = _without_lone(voxels, wishes, counts)
     if not len(voxels.keys) and not objects:
         raise GeometryError(f"{file}: none of its {counts.all} points is left; see --crop")
-    found, used = _few(voxels, wishes.most - len(objects), counts)
+    found, used = _few(voxels, wishes.most - len(objects), counts, tell)
     for number, corners in enumerate(found, 1):
         objects.append(_box(corners, used, names.new(f"{title}-{number}"), common))
     notes = (*_told(counts, wishes), *counts.notes, *_size(found, used, voxels, str(file)))
     return Draft(tuple(objects), notes)
+
+
+def _counted(pieces: Iterable[FloatArray], file: str, tell: Tell) -> Iterator[FloatArray]:
+    """The same pieces, told."""
+    count = 0
+    for piece in pieces:
+        count += len(piece)
+        tell(f"{file}: {count:,} points read")
+        yield piece
 
 
 def _wanted(
@@ -182,14 +200,20 @@ def _without_lone(voxels: Voxels, wishes: CloudWishes, counts: _Counts) -> Voxel
     return Voxels(voxels.side_m, voxels.keys[~lone], voxels.counts[~lone])
 
 
-def _few(voxels: Voxels, most: int, counts: _Counts) -> tuple[FloatArray, Voxels]:
+def _few(voxels: Voxels, most: int, counts: _Counts, tell: Tell) -> tuple[FloatArray, Voxels]:
     """So many boxes at most, of voxels as fine as that allows."""
     factor, used = 1, voxels
-    found = boxes(used)
+
+    def joined() -> Index:
+        count, side = len(used.keys), f"{used.side_m:g} m"
+        tell(f"{counts.file}: joining {count:,} voxels of {side} to at most {most} boxes")
+        return boxes(used)
+
+    found = joined()
     while len(found) > max(most, 1):
         factor = max(factor + 1, factor * 5 // 4)
         used = coarser(voxels, factor)
-        found = boxes(used)
+        found = joined()
     if factor > 1:
         counts.notes.append(
             f"{counts.file}: voxels of {used.side_m:g} m instead of {voxels.side_m:g} m, so that"

@@ -15,7 +15,7 @@ from rampe_guard.assembly import load_machine
 from rampe_guard.collision.shape_cache import ENVIRONMENT
 from rampe_guard.programs.checkup import checkup
 from rampe_guard.runtime import loading
-from rampe_guard.runtime.loading import COMPILING, BuildLine, load_telling
+from rampe_guard.runtime.loading import COMPILING, BuildLine, StatusLine, load_telling
 from rampe_guard.settings import load_site
 from tests.support.arms import box_triangles, fork_triangles, six_axis, write_stl
 
@@ -95,6 +95,24 @@ def test_on_a_pipe_there_is_a_sentence_for_each_mesh_that_takes_long() -> None:
         "wrapping terrain.stl: 20 %",
         "wrapping heap.stl: 20 %",
     ]
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_work_that_takes_long_is_told_at_once_or_now_and_then(*, terminal: bool) -> None:
+    out, clock, said = Terminal() if terminal else io.StringIO(), Clock(), list[str]()
+    line = StatusLine(out, said.append, clock, again_s=10.0)
+    line.show("reading", at_once=True)
+    for step in range(15):
+        clock.now_s += 1.5
+        line.show(f"step {step}")
+    line.clear()
+    if terminal:
+        assert out.getvalue().startswith("\r\x1b[Kreading\r\x1b[Kstep 0\r")
+        assert out.getvalue().endswith("step 14\r\x1b[K")
+        assert said == []
+    else:
+        assert out.getvalue() == ""
+        assert said == ["step 1", "step 8"]
 
 
 def test_compiling_is_said_where_no_kernels_are_kept(

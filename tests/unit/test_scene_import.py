@@ -15,6 +15,8 @@ import trimesh
 from rampe_guard.assembly import load_machine
 from rampe_guard.core.scene import Box, Capsule, Cylinder, Halfspace, Mesh, Sphere
 from rampe_guard.resources import shipped_site
+from rampe_guard.scene_tools.cloud import CloudWishes, import_cloud
+from rampe_guard.scene_tools.draft import Common, Names
 from rampe_guard.settings import load_site
 from tests.support.scene_files import (
     MOVEIT,
@@ -183,6 +185,31 @@ def test_a_cloud_of_every_kind(
     assert "LEFT OUT" not in said
     assert "1 voxels stand alone" in said
     assert "times the" in said
+
+
+def test_what_is_done_to_a_cloud_is_told_while_it_is_done(tmp_path: Path) -> None:
+    file = tmp_path / "c.xyz"
+    np.savetxt(file, cloud_points())
+    told: list[str] = []
+    import_cloud(file, Names(), Common(), CloudWishes(0.1, 20), tell=told.append)
+    assert told[0] == f"{file}: 5,001 points read"
+    assert all(f"{file}: joining " in text for text in told[1:])
+    assert "voxels of 0.1 m to at most 20 boxes" in told[1]
+    assert "voxels of 0.2 m to at most 20 boxes" in told[2]
+
+
+def test_notes_are_told_even_if_nothing_can_be_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, out = tmp_path / "c.xyz", tmp_path / "s.yaml"
+    np.savetxt(file, cloud_points())
+    out.write_text(
+        "objects:\n  - {name: a, type: sphere, radius_m: 1, center: [0, 0, 9]}\nmargin_m: 0\n"
+    )
+    assert run("import", file, "--out", out, "--append") == 2
+    first, *_, last = capsys.readouterr().err.splitlines()
+    assert first.startswith(f"note: {file}: 5001 points")
+    assert str(out) in last
 
 
 def test_what_is_left_out_of_a_cloud_is_told(
