@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
 from rampe_guard.collision.mesh_places import mesh_file
 from rampe_guard.collision.urdf import read_urdf
+from rampe_guard.collision.urdf_joints import MovableJoint
 from rampe_guard.core.identify import identify
 from rampe_guard.errors import SettingsError
 from rampe_guard.folders import Folders
 from rampe_guard.programs.checkup import checkup
 from rampe_guard.programs.initing_files import SiteText, relative, scene_text, site_text
 from rampe_guard.programs.initing_ground import ground_of
-from rampe_guard.programs.initing_plan import ActuatorPlan, Said, chosen_joints, joints_of, plan
+from rampe_guard.programs.initing_plan import ActuatorPlan, chosen_joints, joints_of, plan
 from rampe_guard.programs.initing_questions import (
     Ask,
     cylinders,
@@ -36,7 +36,9 @@ from rampe_guard.programs.initing_source import (
     tell_heard,
     timeout_of,
 )
+from rampe_guard.programs.initing_table import show
 from rampe_guard.programs.initing_wishes import Wishes
+from rampe_guard.programs.initing_writing import to_do, written
 from rampe_guard.programs.measuring import Heard
 from rampe_guard.programs.measuring_ros2 import in_strokes
 from rampe_guard.programs.output import output_folder
@@ -44,31 +46,81 @@ from rampe_guard.runtime.stopping import StopFlag
 
 SITE, SCENE = "site.yaml", "scene.yaml"
 """What is written into the folder."""
+_STOPPED = 130
+"""Exit code of a command that was told to stop, as shells have it."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Ready:
+    """What is known before anything is heard.
+
+    Attributes:
+        wishes: settled.
+        joints: of the URDF.
+        folder: for what is written.
+        ground_m: lowest point of what stands [m].
+        standing: links that stand on the ground.
+        drives: cylinders, by the name of the actuator.
+    """
+
+    wishes: Wishes
+    joints: list[MovableJoint]
+    folder: Path
+    ground_m: float
+    standing: list[str]
+    drives: dict[str, dict[str, Any]]
 
 
 def init(wishes: Wishes, console: Console, stop: StopFlag, ask: Ask | None = None) -> int:
-    """Write a site file and a scene file, then check them; the exit code of `check`.
+    """Write a site file and a scene file that can be guarded; the exit code of `check`.
 
     Args:
         wishes: what was asked for.
         console: for people.
-        stop: ends listening early; what was heard by then counts.
+        stop: ends listening early; what was heard by then counts. Else it ends everything.
         ask: asks whoever sits at the terminal; None: nobody does.
 
     Raises:
         SettingsError, GeometryError, LogError, ConnectionFailedError: what is wrong, and what to
             do.
     """
+    ready = stop.unless_stopped(lambda: _prepared(wishes, ask))
+    heard: Heard | None = None
+    if ready is not None and ready.wishes.live:
+        heard = heard_by(ready.wishes, [joint.name for joint in ready.joints], console, stop)
+        if stop():  # which has ended the listening; whoever wants more than that says so again
+            stop = StopFlag.on_signals()
+    code = None if ready is None else stop.unless_stopped(lambda: _made(ready, heard, console, ask))
+    if code is None:
+        print("rampe-guard: stopped before it was done", file=sys.stderr)  # noqa: T201
+        return _STOPPED
+    return code
+
+
+def _prepared(wishes: Wishes, ask: Ask | None) -> _Ready:
+    """All that can be known, and be wrong, before anything is heard."""
     urdf = Path(wishes.urdf)
     joints = joints_of(urdf)
+    drives = cylinders(wishes.cylinders)
     ground_m, standing = ground_of(urdf, wishes.package_dirs)  # which reads all meshes
     folder = output_folder(wishes.out)
-    _refuse_overwriting(folder, wishes)
-    wishes = replace(wishes, machine=wishes.machine or str(read_urdf(urdf).name) or "machine")
+    _refuse_overwriting(folder, wishes, SITE, SCENE)
+    named = wishes.machine or str(read_urdf(urdf).name).strip() or "machine"
+    wishes = replace(wishes, machine=named)
     if ask is not None:
         wishes = source_asked(wishes, ask)
     wishes = settled(wishes)
-    heard = heard_by(wishes, [joint.name for joint in joints], console, stop)
+    _check_names(wishes)
+    if wishes.live:
+        _refuse_overwriting(folder, wishes, MEASURED)
+    return _Ready(wishes, joints, folder, ground_m, standing, drives)
+
+
+def _made(ready: _Ready, heard: Heard | None, console: Console, ask: Ask | None) -> int:
+    """Measure, propose, write and check."""
+    wishes, joints, folder = ready.wishes, ready.joints, ready.folder
+    if not wishes.live:
+        heard = heard_by(wishes, [joint.name for joint in joints], console, StopFlag())
     measured = () if heard is None else identify(heard.traces)
     if heard is not None:
         tell_heard(heard, measured, console)
@@ -79,7 +131,7 @@ def init(wishes: Wishes, console: Console, stop: StopFlag, ask: Ask | None = Non
     names = list(wishes.names or spoken or [joint.name.removesuffix("_joint") for joint in mine])
     if len(names) != count:
         raise SettingsError(f"--names gives {len(names)} names for {count} actuators")
-    drives = cylinders(wishes.cylinders)
+    drives = ready.drives
     if ask is not None:
         names = names if spoken else names_asked(names, [joint.name for joint in mine], ask)
         drives = drives_asked(names, drives, ask)
@@ -88,23 +140,21 @@ def init(wishes: Wishes, console: Console, stop: StopFlag, ask: Ask | None = Non
         measured = identify(heard.traces)
     axes = 0 if heard is None else heard.traces.axes.shape[1]
     plans = plan(mine, names, measured, drives, axes)
-    console.print(_table(plans))
-    for one in plans:
-        for problem in one.problems:
-            console.print(Text(f"note: {one.name}: {problem}", "yellow"))
+    show(plans, console)
     said = _said(wishes, folder, plans, heard, sure=sure)
-    text = site_text(said)
-    scene = scene_text(said.site, ground_m, standing)
-    _write(folder / SITE, text)
-    _write(folder / SCENE, scene)
+    texts = {
+        folder / SITE: site_text(said),
+        folder / SCENE: scene_text(said.site, ready.ground_m, ready.standing),
+    }
+    kept = f"; what was heard is in {folder / MEASURED}: give it with --log" if wishes.live else ""
+    with written(texts, kept):
+        console.print()
+        code = checkup(str(folder / SITE), console)
     console.print(Text(f"wrote {folder / SITE} and {folder / SCENE}", "bold"))
-    for name, written in ((SITE, text), (SCENE, scene)):
-        todo = sum("TODO" in line for line in written.splitlines() if not line.startswith("# "))
-        if todo:
-            lines = "line needs" if todo == 1 else "lines need"
-            console.print(f"{todo} {lines} a look in {folder / name}: TODO", highlight=False)
-    console.print()
-    return checkup(str(folder / SITE), console)
+    if first := ", ".join(filter(None, (to_do(path, text) for path, text in texts.items()))):
+        measured_ = "" if measured else "; nothing was measured"
+        console.print(Text(f"first look at {first}{measured_}", "bold yellow"))
+    return code
 
 
 def terminal() -> Ask | None:
@@ -120,13 +170,22 @@ def _asked(question: str) -> str:
         raise SettingsError("no answer any more; nothing was written") from None
 
 
-def _refuse_overwriting(folder: Path, wishes: Wishes) -> None:
-    there = [name for name in (SITE, SCENE, MEASURED) if (folder / name).exists()]
+def _refuse_overwriting(folder: Path, wishes: Wishes, *names: str) -> None:
+    there = [name for name in names if (folder / name).exists()]
     if there and not wishes.force:
         raise SettingsError(
             f"{folder} holds {', '.join(there)} already; give another folder with --out, or --force"
             " to write them anew"
         )
+
+
+def _check_names(wishes: Wishes) -> None:
+    """Names that no site file may have are told before anybody moves a machine for it."""
+    for option, name in (("--site", wishes.site), ("--machine", wishes.machine)):
+        if not name or name != name.strip() or not name.isprintable():
+            raise SettingsError(f"{option} {name!r} is no name; give letters, digits and hyphens")
+    if twice := [name for name in wishes.names if wishes.names.count(name) > 1]:
+        raise SettingsError(f"--names: {twice[0]} is there twice; each actuator has its own")
 
 
 def _said(
@@ -138,8 +197,7 @@ def _said(
     sure: bool,
 ) -> SiteText:
     live = heard is not None and wishes.log is None
-    base = f"rampe/{wishes.site}/{wishes.machine}".replace(" ", "-")
-    keys = [f"{base}/joystick", f"{base}/actuators"]
+    keys = [f"{wishes.base}/joystick", f"{wishes.base}/actuators"]
     ros2 = block_of(wishes) if wishes.format == "ros2" else None
     if ros2 is not None:
         keys = list(speech(wishes).said.values())
@@ -156,6 +214,7 @@ def _said(
         machine=wishes.machine,
         joystick=keys[0],
         actuators=keys[1],
+        base=wishes.base,
         origin=origin,
         urdf=relative(folder, Path(wishes.urdf)),
         package_dirs=packages,
@@ -181,35 +240,3 @@ def _allowed(folder: Path, urdf: Path, package_dirs: tuple[str, ...]) -> tuple[s
     outside = [one for one in sorted(needed) if not home.hold(one)]
     least = [one for one in outside if not any(up in outside for up in one.parents)]
     return tuple(relative(folder, one) for one in least)
-
-
-def _table(plans: Sequence[ActuatorPlan]) -> Table:
-    table = Table(title="proposed; ? is not measured", title_justify="left", title_style="bold")
-    table.box, table.pad_edge = None, False
-    columns = ("name", "joint", "axis", "top speed", "braking", "lag", "deadband", "seen")
-    for column in columns:
-        table.add_column(column, header_style="dim", overflow="fold")
-    for one in plans:
-        axis = f"{'+' if one.sign.value > 0 else '-'}{one.axis.value}"
-        table.add_row(
-            one.name,
-            one.joint.name,
-            _shown(one.axis, axis),
-            _shown(one.max_velocity, f"{one.max_velocity.value:g} {one.unit}/s"),
-            _shown(one.max_deceleration, f"{one.max_deceleration.value:g} {one.unit}/s²"),
-            _shown(one.lag_s, f"{one.lag_s.value:g} s"),
-            _shown(one.deadband, f"{one.deadband.value:g}"),
-            one.seen or "-",
-        )
-    return table
-
-
-def _shown(said: Said, text: str) -> str:
-    return f"{text} ?" if said.todo else text
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise SettingsError(f"{path}: cannot be written ({error.strerror})") from None

@@ -27,6 +27,7 @@ class SiteText:
     Attributes:
         site, machine: names.
         joystick, actuators: keys.
+        base: what the keys of the machine begin with.
         origin: what it was made from, in words.
         urdf: path, relative to the site file.
         package_dirs, allow: folders, relative to the site file.
@@ -43,6 +44,7 @@ class SiteText:
     machine: str
     joystick: str
     actuators: str
+    base: str
     origin: str
     urdf: str
     package_dirs: tuple[str, ...]
@@ -71,9 +73,8 @@ def site_text(said: SiteText) -> str:
         zenoh["plain_network"] = "i accept that anyone on this network can read and forge messages"
     if zenoh:
         root["zenoh"] = zenoh
-    base = f"rampe/{_part(said.site)}/{_part(said.machine)}"
     root["keys"] = CommentedMap(
-        joystick=said.joystick, actuators=said.actuators, base=f"{base}/guard"
+        joystick=said.joystick, actuators=said.actuators, base=f"{said.base}/guard"
     )
     root["keys"].yaml_add_eol_comment("all that the guard publishes lies below", key="base")
     if said.ros2 is not None:
@@ -169,8 +170,8 @@ def _arm(said: SiteText) -> CommentedMap:
 
 def _actuator(plan: ActuatorPlan, said: SiteText) -> CommentedMap:
     one = CommentedMap(name=plan.name, joint=plan.joint.name)
-    if plan.seen:
-        one.yaml_add_eol_comment(f"seen at {plan.seen}", key="name")
+    if plan.seen is not None:
+        one.yaml_add_eol_comment(f"seen at {plan.range}", key="name")
     if not said.order_sure:
         one.yaml_add_eol_comment("TODO messages name no joints: in the URDF's order", key="joint")
     if plan.drive is not None:
@@ -223,11 +224,6 @@ def _flow_map(items: Mapping[str, Any]) -> CommentedMap:
     found = CommentedMap(items)
     found.fa.set_flow_style()
     return found
-
-
-def _part(name: str) -> str:
-    """A name as a part of a key."""
-    return "".join(c if c.isalnum() or c in "-_." else "-" for c in name)
 
 
 def _line(text: str) -> str:

@@ -74,10 +74,18 @@ class ActuatorPlan:
     max_deceleration: Said
     lag_s: Said
     deadband: Said
-    seen: str
+    seen: tuple[float, float] | None
     drive: dict[str, Any] | None = None
     limits: Said | None = None
     problems: tuple[str, ...] = field(default=())
+
+    @property
+    def range(self) -> str:
+        """Where it was seen; empty if nowhere."""
+        if self.seen is None:
+            return ""
+        low, high = (round(end, 3) + 0.0 for end in self.seen)  # no -0.000
+        return f"{low:.3f} … {high:.3f} {self.unit}"
 
     @property
     def unit(self) -> str:
@@ -209,7 +217,7 @@ def _actuator(
         max_deceleration=_said(stop, usual, slow, up=False),
         lag_s=_said(None if one is None else one.lag_s, LAG_UNSEEN_S, "not measured", up=True),
         deadband=_deadband(one),
-        seen="" if one is None else f"{one.seen[0]:.4g} … {one.seen[1]:.4g} {unit}",
+        seen=None if one is None else one.seen,
         drive=drive,
         limits=limits,
         problems=(*(() if one is None else one.problems), *problems),

@@ -41,8 +41,7 @@ def source_asked(wishes: Wishes, ask: Ask) -> Wishes:
     if not end:
         return wishes
     wishes = replace(_format_asked(wishes, ask), connect=(end,))
-    base = f"rampe/{wishes.site}/{wishes.machine}"
-    keys, what = (f"{base}/joystick", f"{base}/actuators"), "Key"
+    keys, what = (f"{wishes.base}/joystick", f"{wishes.base}/actuators"), "Key"
     if wishes.format == "ros2":
         keys, what = (JOYSTICK_TOPIC, ACTUATORS_TOPIC), "Topic"
     return replace(

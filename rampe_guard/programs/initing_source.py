@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
+from rich.text import Text
 
 from rampe_guard.core.identify import Measured
 from rampe_guard.errors import LogError, SettingsError
@@ -29,6 +30,8 @@ MEASURED = "measured.csv"
 _TELL_S = 10.0
 _USUAL_TIMEOUT_S, _LONGEST_TIMEOUT_S = 0.5, 2.0
 _RARE = 0.999
+_HOLE_S = 2.0
+"""A longer silence is worth a word [s]."""
 
 
 def heard_by(
@@ -108,6 +111,12 @@ def tell_heard(heard: Heard, measured: Sequence[Measured], console: Console) -> 
         f" {heard.seconds:.0f} s{reasons(heard.refused)}",
         highlight=False,
     )
+    for what, times in (("levers", traces.lever_s), ("positions", traces.time_s)):
+        steps = np.diff(np.sort(times))
+        if steps.size and steps.max() > _HOLE_S:
+            at_s = float(np.sort(times)[int(steps.argmax())] - times.min())
+            text = f"note: no {what} for {steps.max():.0f} s, {at_s:.0f} s after the first"
+            console.print(Text(text, "yellow"))
     if not measured:
         raise LogError(f"{heard.origin}: is too short; both inputs must be there for some seconds")
 

@@ -9,6 +9,11 @@ from typing import Any, Self
 from rampe_guard.settings.ros2_keys import Transport
 
 
+def key_part(name: str) -> str:
+    """A name as a part of a key."""
+    return "".join(c if c.isalnum() or c in "-_." else "-" for c in name)
+
+
 @dataclass(frozen=True, slots=True)
 class Wishes:
     """What was asked for.
@@ -61,6 +66,11 @@ class Wishes:
     def live(self) -> bool:
         """The machine itself is listened to."""
         return self.log is None and (bool(self.connect) or self.zenoh is not None)
+
+    @property
+    def base(self) -> str:
+        """What the keys of this machine begin with."""
+        return f"rampe/{key_part(self.site)}/{key_part(self.machine)}"
 
     @classmethod
     def of(cls, args: Mapping[str, Any]) -> Self:

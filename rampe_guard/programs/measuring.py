@@ -28,6 +28,8 @@ M = TypeVar("M", bound=Message)
 
 Arrived = tuple[float, bytes]
 """When a message came [s], and the message."""
+_LEAST_S, _CLOCK_FACTOR = 1.0, 10.0
+"""Stamps and arrivals of so long must not be so many times apart."""
 _SAMPLE = 50
 """Messages of a topic that are looked at to find out what it is."""
 _JSON = Decoders(
@@ -150,6 +152,9 @@ def traces_of(
 
     If every message of an input has a stamp, its times are the stamps, put off by the shortest way
     that any message took: so a sender with another clock does no harm. Else they are the arrivals.
+
+    Raises:
+        LogError: stamps are no time.
     """
     refused: Counter[str] = Counter()
     sticks = _decoded(levers, decoders.joystick, "joystick", refused)
@@ -165,14 +170,36 @@ def traces_of(
             continue
         times.append((at_s, place.stamp))
         rows.append([place.position[i] for i in order])
+    sent = [(at_s, m.stamp) for at_s, m in sticks]
+    for what, stamps in (("joystick", sent), ("actuators", times)):
+        _check_stamps(what, stamps)
     traces = Traces(
-        lever_s=on_our_clock([(at_s, m.stamp) for at_s, m in sticks]),
+        lever_s=on_our_clock(sent),
         axes=np.array([m.axes for _, m in sticks], dtype=np.float64).reshape(len(sticks), -1),
         time_s=on_our_clock(times),
         position=np.array(rows, dtype=np.float64).reshape(len(rows), -1),
         names=names,
     )
     return traces, +refused
+
+
+def _check_stamps(what: str, times: Sequence[tuple[float, float | None]]) -> None:
+    """Stamps must go on about as fast as the time in which messages came.
+
+    Raises:
+        LogError: they are in another unit, or the clock was set.
+    """
+    stamped = [(at_s, stamp_s) for at_s, stamp_s in times if stamp_s is not None]
+    if len(stamped) < max(2, len(times)):
+        return
+    came_s = stamped[-1][0] - stamped[0][0]
+    sent_s = abs(stamped[-1][1] - stamped[0][1])
+    if came_s < _LEAST_S or came_s / _CLOCK_FACTOR <= sent_s <= came_s * _CLOCK_FACTOR:
+        return
+    raise LogError(
+        f"{what}: stamps go on by {sent_s:.3g} s while {came_s:.3g} s pass: is stamp in seconds, or"
+        " was the sender's clock set? A guard refuses such messages"
+    )
 
 
 def on_our_clock(times: Sequence[tuple[float, float | None]]) -> FloatArray:
