@@ -178,6 +178,11 @@ def _replay(args: argparse.Namespace) -> int:
 def _evaluate(args: argparse.Namespace) -> int:
     from pathlib import Path
 
+    # said before the imports, which take a while, and so does all the rest
+    many = f"{len(args.log)} logs" if len(args.log) > 1 else " ".join(args.log)
+    what = many if args.fleet is None else f"the sequences of {args.fleet}"
+    if args.log or args.fleet is not None:
+        print(f"evaluating {what}: a minute of work takes some ten seconds", file=sys.stderr)
     from rich.console import Console
 
     from rampe_guard.programs.evaluating import Wishes, evaluate

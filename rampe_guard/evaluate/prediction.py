@@ -125,6 +125,25 @@ class Prediction:
     calibration_known: Calibration
 
 
+def _why_none(runs: Sequence[Run], config: GuardConfig) -> str:
+    """Why there is no complete primitive in some runs."""
+    cut_short = sum(run.incomplete for run in runs)
+    if not cut_short:
+        return f"no lever was moved for {config.joystick.debounce_s:g} s"
+    why = []
+    if silences := sum(run.silences for run in runs):
+        apart_s = max(run.duration_s / max(run.rows - 1, 1) for run in runs)
+        allowed_s = min(config.inputs.joystick_timeout_s, config.inputs.actuators_timeout_s)
+        why.append(
+            f"inputs silent for longer than {allowed_s:g} s ({silences} in all, rows are"
+            f" {apart_s:.2g} s apart)"
+        )
+    if refused := sum(run.refused for run in runs):
+        why.append(f"refused samples ({refused} in all)")
+    words = " and ".join(why) or f"they are shorter than {config.joystick.debounce_s:g} s"
+    return f"{cut_short} begun, and all cut short: {words}"
+
+
 def assess(
     config: GuardConfig,
     limits: FloatArray,
@@ -149,11 +168,8 @@ def assess(
     judged_runs = runs[frozen or 0 :]
     if not any(run.segments for run in judged_runs):
         names = ", ".join(run.name for run in judged_runs)
-        cut_short = sum(run.incomplete for run in judged_runs)
-        raise LogError(
-            f"{names}: no complete primitive ({cut_short} incomplete): no lever was moved for"
-            f" {config.joystick.debounce_s:g} s, so there is nothing to predict"
-        )
+        why = _why_none(judged_runs, config)
+        raise LogError(f"{names}: no complete primitive, so there is nothing to predict: {why}")
     width, middle = position_range(runs), position_middle(runs)
 
     def team() -> dict[str, Forecaster]:

@@ -96,6 +96,7 @@ class Run:
         duration_s: from the first row to the last [s].
         low: smallest accepted position of each actuator (n,) [unit].
         high: the greatest (n,) [unit].
+        silences: how often an input fell silent for longer than its time-out.
     """
 
     name: str
@@ -107,6 +108,7 @@ class Run:
     duration_s: float
     low: FloatArray
     high: FloatArray
+    silences: int = 0
 
 
 def cut(config: GuardConfig, limits: FloatArray, log: Log) -> Run:
@@ -133,6 +135,7 @@ def cut(config: GuardConfig, limits: FloatArray, log: Log) -> Run:
         duration_s=float(log.time_s[-1] - log.time_s[0]),
         low=follower.low,
         high=follower.high,
+        silences=follower.silences,
     )
 
 
@@ -162,6 +165,7 @@ class _Follower:
 
     Attributes:
         refused: samples that the gate refused so far.
+        silences: how often an input fell silent so far.
         low, high: extremes of the accepted positions (n,) [unit].
     """
 
@@ -177,7 +181,8 @@ class _Follower:
         self._start: Start | None = None
         self._way: list[tuple[float, FloatArray, FloatArray, FloatArray]] = []
         self._step_s: float | None = None
-        self.refused = 0
+        self._blind = False
+        self.refused = self.silences = 0
         self.low: FloatArray = np.full(len(config.actuators), np.inf)
         self.high: FloatArray = np.full(len(config.actuators), -np.inf)
 
@@ -228,7 +233,10 @@ class _Follower:
         return verdict.sample
 
     def _look(self, now_s: float) -> None:
-        if self._monitor.health(now_s).status is Status.NOT_MONITORING:
+        was_blind = self._blind
+        self._blind = self._monitor.health(now_s).status is Status.NOT_MONITORING
+        self.silences += self._blind and not was_blind
+        if self._blind:
             self._tracker.interrupt()
 
     def _changed(

@@ -33,6 +33,9 @@ from rampe_guard.recording import open_log
 from rampe_guard.runtime.loading import load_telling
 from rampe_guard.settings import load_site
 
+_LINE_S = 10.0
+"""Least time between two lines on how far it is, where there is no bar [s]."""
+
 
 @dataclass(frozen=True, slots=True)
 class Wishes:
@@ -129,10 +132,11 @@ def _check(order: Order) -> None:
 
 
 class _progress:  # noqa: N801 - a context manager that is used like a function
-    """A bar on stderr if it is a terminal; elsewhere nothing."""
+    """A bar on stderr if it is a terminal; elsewhere a line now and then."""
 
     def __init__(self) -> None:
         console = Console(stderr=True)
+        self._lines = not console.is_terminal
         self._bar = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
@@ -146,9 +150,14 @@ class _progress:  # noqa: N801 - a context manager that is used like a function
     def __enter__(self) -> Callable[[int, int], None]:
         self._bar.start()
         task = self._bar.add_task("evaluating", total=None)
+        said_s = time.monotonic()
 
         def tell(done: int, total: int) -> None:
+            nonlocal said_s
             self._bar.update(task, completed=done, total=total)
+            if self._lines and time.monotonic() - said_s > _LINE_S:
+                said_s = time.monotonic()
+                print(f"{done} of {total} pieces evaluated", file=sys.stderr)  # noqa: T201
 
         return tell
 
@@ -216,10 +225,11 @@ def _table(made: Report) -> Table:
 def _outside_the_figures(made: Report) -> Iterator[str]:
     """What no figure of the table counts: when the guard was blind, where the arm began inside."""
     if made.not_monitoring_s > 0.0:
-        at = made.forecasts[GUARD].operating_point
+        blind = made.forecasts[GUARD].operating_point.unmonitored
+        more = "1 more crossing" if blind == 1 else f"{blind} more crossings"
         yield (
-            f"NOT MONITORING {made.not_monitoring_s:.1f} of {made.duration_s:.1f} s:"
-            f" {at.unmonitored} crossings came meanwhile, neither warned of nor missed"
+            f"NOT MONITORING {made.not_monitoring_s:.1f} of {made.duration_s:.1f} s: {more} came"
+            " meanwhile, neither warned of nor missed"
         )
     for log in made.logs:
         inside = ", ".join(

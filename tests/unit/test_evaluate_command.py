@@ -15,6 +15,7 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 import jsonschema  # type: ignore[import-untyped]
+import numpy as np
 import pytest
 
 from rampe_guard.cli import main
@@ -210,6 +211,39 @@ def test_a_short_log_has_no_known_categories_and_is_no_error(
     jsonschema.validate(json.loads((tmp_path / "report.json").read_text("utf-8")), report_schema())
 
 
+def test_the_report_tells_when_the_guard_was_blind_and_where_the_arm_began(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = write_log(tmp_path / "whole.csv", 2, seed=3).read_text("utf-8").splitlines()
+    column = lines[0].split(",").index("Swing Ms")
+    rows = [line.split(",") for line in lines[1:]]
+    begin = int(np.argmin([float(row[column]) for row in rows]))  # beyond a slew limit
+    rows = rows[begin:]
+    for row in rows[len(rows) // 2 :]:
+        row[0] = f"{float(row[0]) + 5.0:.9g}"  # five seconds are missing
+    (tmp_path / "holed.csv").write_text(
+        "\n".join([lines[0], *(",".join(row) for row in rows)]) + "\n", "utf-8"
+    )
+    evaluated(tmp_path, str(tmp_path / "holed.csv"))
+    report = json.loads((tmp_path / "report.json").read_text("utf-8"))
+    jsonschema.validate(report, report_schema())
+    ((start, end),) = report["logs"][0]["not_monitoring"]
+    assert 4.0 < end - start < 5.1
+    assert report["not_monitoring_s"] == pytest.approx(end - start)
+    watched = len(report["zones"]) * (report["duration_s"] - (end - start)) / 60.0
+    for forecast in report["forecasts"].values():
+        assert forecast["operating_point"]["zone_minutes"] == pytest.approx(watched)
+    inside = {name: zone["inside_at_first_s"] for name, zone in report["logs"][0]["zones"].items()}
+    (first,) = [name for name, seconds in inside.items() if seconds is not None]
+    told = " ".join(capsys.readouterr().out.split())
+    page = (tmp_path / "report.html").read_text("utf-8")
+    assert f"NOT MONITORING {end - start:.1f} of" in told
+    assert f"holed.csv: inside from the start, which counts as no crossing: {first} (" in told
+    assert "NOT MONITORING of" in page
+    assert 'class="blind"' in page
+    assert f"counts as no crossing: {first} (" in page
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -271,6 +305,7 @@ def test_a_missing_extra_is_named(logs: list[str], tmp_path: Path) -> None:
         cwd=ROOT,
     )
     assert done.returncode == 2
+    assert done.stderr.startswith("evaluating ")  # before anything is loaded
     assert "needs river" in done.stderr
     assert "rampe-guard[eval]" in done.stderr
     assert "Traceback" not in done.stderr

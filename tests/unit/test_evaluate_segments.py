@@ -12,7 +12,9 @@ from rampe_guard.core.config import ActuatorConfig, GuardConfig, Observation, Ra
 from rampe_guard.core.events import PredictionEvent
 from rampe_guard.core.guard import Guard
 from rampe_guard.core.types import FloatArray, Placement, SweepResult
+from rampe_guard.errors import LogError
 from rampe_guard.evaluate.forecasters import SiteRampe
+from rampe_guard.evaluate.prediction import assess
 from rampe_guard.evaluate.segments import cut, position_middle, position_range
 from rampe_guard.runtime.csv_log import CsvLog
 from rampe_guard.runtime.replay import replay
@@ -167,3 +169,22 @@ def test_range_and_middle_are_those_of_all_runs_together() -> None:
     assert position_middle(runs) == pytest.approx([0.4, 0.3])
     assert runs[0].name == "made.csv"
     assert runs[0].duration_s == pytest.approx(1.0)
+
+
+def refusal(made: CsvLog) -> str:
+    with pytest.raises(LogError) as caught:
+        assess(CONFIG, LIMITS, [cut(CONFIG, LIMITS, made)], fresh=False)
+    return str(caught.value)
+
+
+def test_why_there_is_nothing_to_predict() -> None:
+    assert "no lever was moved for 0.08 s" in refusal(log([]))
+    slow = refusal(log(STROKES, period_s=0.6))
+    assert "begun, and all cut short: inputs silent for longer than 0.5 s (12 in all" in slow
+    assert "rows are 0.6 s apart" in slow
+    assert "refused" not in slow
+    made = log([(1.0, 1.0, 0.0)])
+    q = made.position.copy()
+    q[10, 1] = 0.95
+    spike = refusal(CsvLog(made.path, made.time_s, made.axes, q, ()))
+    assert "1 begun, and all cut short: refused samples (1 in all)" in spike
