@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import csv
 
 from rampe_guard.options import add_site, positive
 
@@ -28,13 +29,15 @@ def add_init(parser: argparse.ArgumentParser) -> None:
         help="accept that anyone on the network of --connect can read and forge messages",
     )
     text = "key of the joystick, or topic of ROS 2 (then default /joy); of a CSV log its columns,"
-    text += " in the order of the axes: NAME[:SCALE[:OFFSET]],…"
+    text += " in the order of the axes: NAME[:SCALE[:OFFSET]],… (default u_NAME of each NAME)"
     source.add_argument("--joystick", metavar="KEY", help=text)
     text = "key of the actuators, or topic (default /joint_states); of a CSV log the columns of the"
     source.add_argument(
         "--actuators", metavar="KEY", help=f"{text} positions, written the same way"
     )
-    source.add_argument("--time", metavar="COLUMN", help="of a CSV log; COLUMN:SCALE makes it [s]")
+    source.add_argument(
+        "--time", metavar="COLUMN", help="of a CSV log (default t); COLUMN:SCALE makes it [s]"
+    )
     source.add_argument(
         "--seconds", type=positive, default=60.0, help="for how long to listen live (default 60)"
     )
@@ -104,8 +107,11 @@ def domain(text: str) -> int:
 
 
 def names(text: str) -> tuple[str, ...]:
-    """Names with commas between them."""
-    found = tuple(part.strip() for part in text.split(","))
-    if not all(found):
+    """Names with commas between them; one that has a comma in it stands in double quotes."""
+    try:
+        found = tuple(part.strip() for part in next(csv.reader([text], skipinitialspace=True), []))
+    except csv.Error:
+        found = ()
+    if not found or not all(found):
         raise argparse.ArgumentTypeError(f"{text!r} has an empty name")
     return found

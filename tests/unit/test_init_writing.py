@@ -85,7 +85,8 @@ def test_it_ends_while_it_reads(tmp_path: Path, number: signal.Signals) -> None:
     pipe = tmp_path / "log.csv"
     os.mkfifo(pipe)
     urdf = small_arm.write_urdf(tmp_path)
-    args = ["-m", "rampe_guard", "init", urdf, "--out", tmp_path / "site", "--log", pipe, "--yes"]
+    where: list[str | Path] = ["--out", tmp_path / "site", "--log", pipe]
+    args = ["-m", "rampe_guard", "init", urdf, *where, "--yes"]
     with Process(tmp_path, "init", args) as process:
         writer = _writer(pipe)
         try:

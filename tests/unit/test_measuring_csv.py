@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import io
+from argparse import ArgumentTypeError
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
+from rampe_guard.core.identify import identify
 from rampe_guard.errors import LogError
+from rampe_guard.options_init import names
+from rampe_guard.programs.initing_source import tell_heard
 from rampe_guard.programs.measuring import reasons
 from rampe_guard.programs.measuring_csv import column_maps, heard_in_csv
 from rampe_guard.settings import ColumnMap
@@ -53,6 +59,22 @@ def test_a_name_with_commas_is_quoted() -> None:
         ColumnMap("b"),
         ColumnMap("c", 3.0),
     ]
+
+
+def test_names_of_joints_are_quoted_alike() -> None:
+    assert names('"Heb: 1, links", b') == ("Heb: 1, links", "b")
+    for text in ("", "a,,b", "a\rb"):
+        with pytest.raises(ArgumentTypeError, match="empty name"):
+            names(text)
+
+
+def test_a_long_silence_is_told(tmp_path: Path) -> None:
+    late = [",".join([f"{60 + 0.04 * k:.2f}", *ROWS[k].split(",")[1:]]) for k in range(40)]
+    heard = heard_in_csv(_log(tmp_path, [*ROWS, *late]), None, None, None)
+    console = Console(file=io.StringIO(), width=200)
+    tell_heard(heard, identify(heard.traces), console)
+    assert isinstance(console.file, io.StringIO)
+    assert "note: no positions for 58 s, 2 s after the first" in console.file.getvalue()
 
 
 @pytest.mark.parametrize("text", ['"a', 'a"b', '"a"b', "a:", ",a", "a,"])
