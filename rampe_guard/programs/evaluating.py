@@ -28,6 +28,7 @@ from rampe_guard.evaluate.report_model import Point, Report, Strict, report_byte
 from rampe_guard.evaluate.stages import machine_of
 from rampe_guard.programs.evaluating_prediction import prediction_summary, prediction_title
 from rampe_guard.programs.fleet_file import read_fleet
+from rampe_guard.programs.log_motion import motion_warnings
 from rampe_guard.programs.output import output_folder
 from rampe_guard.recording import open_log
 from rampe_guard.runtime.loading import load_telling
@@ -127,7 +128,8 @@ def _check(order: Order) -> None:
     site = load_site(order.site)
     limits = load_arm(site.arm).limits
     for path in order.logs:
-        for warning in open_log(site, path, limits).warnings:
+        log = open_log(site, path, limits)
+        for warning in (*log.warnings, *motion_warnings(site, log)):
             print(f"warning: {warning}", file=sys.stderr)  # noqa: T201
 
 

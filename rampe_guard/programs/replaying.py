@@ -17,6 +17,7 @@ from rampe_guard.core.guard import Guard
 from rampe_guard.core.monitor import Status
 from rampe_guard.errors import InterruptedReplayError, LogError, MessageError, ModelFileError
 from rampe_guard.evaluate.tally import Tally
+from rampe_guard.programs.log_motion import motion_warnings
 from rampe_guard.programs.scoring import closing_table
 from rampe_guard.recording import Log, McapLog, McapReading, is_mcap, open_log
 from rampe_guard.recording.bag import is_bag
@@ -103,8 +104,8 @@ def site_of(site_path: str | None, log_path: str) -> Iterator[Site]:
 
 
 def tell_warnings(site: Site, log: Log) -> None:
-    """What of a log is left out or missing, on stderr."""
-    for warning in log.warnings:
+    """What of a log is left out, missing or against the site file, on stderr."""
+    for warning in (*log.warnings, *motion_warnings(site, log)):
         print(f"warning: {warning}", file=sys.stderr)  # noqa: T201
     for item in site.scene.moving:
         if item.name not in log.objects:
