@@ -24,6 +24,8 @@ SLACKS = (0.1, 0.05, 0.02, 0.0)
 """Shares of its range by which a path may overrun an actuator's limits, the first that works."""
 TURNING = ("revolute", "continuous")
 MOVABLE = (*TURNING, "prismatic")
+FARTHEST = 1e6
+"""Ends beyond it are how some say that there are none; no position is beyond it [rad or m]."""
 MANY = ("floating", "planar")
 """More than one way to move, which no actuator drives."""
 
@@ -89,9 +91,11 @@ def _depth(joint: Joint, above: Mapping[str, Joint]) -> int:
 
 
 def ends_of(joint: Joint) -> tuple[float, float]:
-    """Its ends [rad or m], infinite where the URDF gives none."""
+    """Its ends [rad or m], infinite where the URDF gives none, or such as no joint has."""
     limit = joint.limit
     if joint.type == "continuous" or limit is None or limit.lower is None or limit.upper is None:
+        return -np.inf, np.inf
+    if max(-limit.lower, limit.upper) > FARTHEST:
         return -np.inf, np.inf
     return limit.lower, limit.upper
 

@@ -35,8 +35,6 @@ _OTHER_UNITS = {
 """What positions may be in, and what makes them those of a URDF."""
 _FAR = 3.0
 """Positions in another unit are so many times beyond the ends, at least."""
-_MOST_END = 1e6
-"""No joint gets so far [rad or m]: such limits are none."""
 _WIDEST_DEADBAND = 0.3
 """No lever needs more to begin to move something: what was measured so was something else [-]."""
 _BEYOND = 0.05
@@ -260,9 +258,9 @@ def _limits(
     """Limits to write, if the URDF's will not do, and what is wrong with what was seen."""
     seen = None if one is None or not one.moved else one.seen
     low, high = joint.lower, joint.upper
-    if drive is None and math.isfinite(low) and max(-low, high) > _MOST_END:
-        text = f"the URDF's limits {low:.4g} … {high:.4g} are no joint's: correct them there, or"
-        return None, (f"{text} write limits: {{lower: …, upper: …}} here",)
+    if drive is None and joint.kind == "revolute" and math.isinf(low):
+        text = "the URDF tells no ends, or such as no joint has, and it is taken as endless:"
+        return None, (f"{text} if it has ends, write limits: {{lower: …, upper: …}}",)
     if drive is not None or not np.isfinite(high - low):
         if seen is None or (drive is None and joint.kind != "prismatic"):
             return None, ()

@@ -111,7 +111,9 @@ def tell_heard(heard: Heard, measured: Sequence[Measured], console: Console) -> 
         f" {heard.seconds:.0f} s{reasons(heard.refused)}",
         highlight=False,
     )
-    for what, times in (("levers", traces.lever_s), ("positions", traces.time_s)):
+    together = traces.lever_s is traces.time_s
+    parts = (("levers", traces.lever_s), ("positions", traces.time_s))
+    for what, times in (("rows", traces.time_s),) if together else parts:
         steps = np.diff(np.sort(times))
         if steps.size and steps.max() > _HOLE_S:
             at_s = float(np.sort(times)[int(steps.argmax())] - times.min())

@@ -44,7 +44,7 @@ def _table(plans: Sequence[ActuatorPlan]) -> Table:
             _shown(one.deadband, f"{one.deadband.value:g}"),
             one.range or one.unit,
         )
-    table.caption = "speeds per s, braking per s², lag in s; all in the unit of what was seen"
+    table.caption = "speed and braking per s and s², lag in s, in the unit of seen"
     table.caption_justify = "left"
     return table
 

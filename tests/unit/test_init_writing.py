@@ -79,6 +79,17 @@ def test_what_was_heard_live_may_lie_in_the_folder(tmp_path: Path) -> None:
     assert (code, err) == (0, "")
 
 
+def test_ends_that_no_joint_has_are_none(tmp_path: Path) -> None:
+    urdf = small_arm.write_urdf(tmp_path)
+    text = urdf.read_text()
+    assert 'lower="-2.5" upper="2.5"' in text
+    urdf.write_text(text.replace('lower="-2.5" upper="2.5"', 'lower="-1e308" upper="1e308"'))
+    done = called("init", urdf, "--out", tmp_path / "site", "--yes")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "turn: the URDF tells no ends, or such as no joint has" in done.stdout
+    assert "endless" in done.stdout
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_it_ends_while_it_reads(tmp_path: Path, number: signal.Signals) -> None:
     """The log is a pipe into which nobody writes: a file that takes for ever."""

@@ -74,7 +74,7 @@ def test_a_long_silence_is_told(tmp_path: Path) -> None:
     console = Console(file=io.StringIO(), width=200)
     tell_heard(heard, identify(heard.traces), console)
     assert isinstance(console.file, io.StringIO)
-    assert "note: no positions for 58 s, 2 s after the first" in console.file.getvalue()
+    assert "note: no rows for 58 s, 2 s after the first" in console.file.getvalue()
 
 
 @pytest.mark.parametrize("text", ['"a', 'a"b', '"a"b', "a:", ",a", "a,"])
