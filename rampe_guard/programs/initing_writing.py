@@ -25,6 +25,8 @@ def written(texts: Mapping[Path, str], more: str = "") -> Iterator[None]:
         for path, text in texts.items():
             _write(path, text)
         yield
+    except BrokenPipeError:
+        raise  # `| head` has seen enough, which says nothing of the files
     except BaseException as error:
         for path, content in before.items():
             if content is None:

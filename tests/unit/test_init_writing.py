@@ -11,6 +11,7 @@ import pytest
 
 from rampe_guard.errors import LogError
 from rampe_guard.programs.initing_wishes import key_part
+from rampe_guard.programs.initing_writing import written
 from rampe_guard.programs.measuring import traces_of
 from rampe_guard.settings import load_site
 from tests.support import small_arm
@@ -88,6 +89,16 @@ def test_ends_that_no_joint_has_are_none(tmp_path: Path) -> None:
     assert (done.returncode, done.stderr) == (0, "")
     assert "turn: the URDF tells no ends, or such as no joint has" in done.stdout
     assert "endless" in done.stdout
+
+
+def test_a_reader_who_has_seen_enough_costs_no_file(tmp_path: Path) -> None:
+    site = tmp_path / "site.yaml"
+    with pytest.raises(BrokenPipeError), written({site: "good"}):
+        raise BrokenPipeError
+    assert site.read_text() == "good"
+    with pytest.raises(KeyboardInterrupt), written({site: "half"}):
+        raise KeyboardInterrupt
+    assert site.read_text() == "good"
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
