@@ -187,8 +187,10 @@ class Worker:
         self._alerts.put(payload)
         self._marker.note(message)  # repeats too: a contact that begins may be no transition
         if event.kind == "transition":
+            own = message.source == "system"  # a log has room for what a display has not
+            text = wire.in_full(message.text, event.evidence.note) if own else message.text
             self._say.info(
-                f"{message.level}: {message.text}",
+                f"{message.level}: {text}",
                 alert_id=message.alert_id,
                 level=message.level,
                 zone=message.zone,

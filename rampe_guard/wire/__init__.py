@@ -40,7 +40,7 @@ from rampe_guard.wire.schema import json_schemas
 from rampe_guard.wire.shelve import Shelve
 from rampe_guard.wire.state import State
 from rampe_guard.wire.sweep import SweepReply, SweepRequest, decode_sweep_request
-from rampe_guard.wire.text import MAX_TEXT, advice_text, alert_text, no_advice_text
+from rampe_guard.wire.text import MAX_TEXT, advice_text, alert_text, in_full, no_advice_text
 
 __all__ = [
     "MAX_PAYLOAD_BYTES",
@@ -88,6 +88,7 @@ __all__ = [
     "decode_object_pose",
     "decode_sweep_request",
     "encode",
+    "in_full",
     "json_schemas",
     "no_advice_text",
 ]

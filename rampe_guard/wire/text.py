@@ -11,6 +11,7 @@ import unicodedata
 
 MAX_TEXT = 60
 _ARROW = " → "
+_BLIND = "NOT MONITORING: "
 _LONGEST_S = 99.0
 
 
@@ -52,6 +53,18 @@ def alert_text(
     return _pair(link, _ARROW, zone, _when(time_to_collision_s) + why)
 
 
+def in_full(text: str, reason: str) -> str:
+    """The text of an alert about the guard itself with all of its reason, for who has room.
+
+    Args:
+        text: as `alert_text` made it, with "…" if it was cut.
+        reason: of the alert.
+    """
+    if not text.endswith("…"):
+        return text
+    return (_BLIND if text.startswith(_BLIND) else "") + _line(reason)
+
+
 def advice_text(lever: str | None, share: float, zone: str | None) -> str:
     """Text such as ``swing at most 30 %: cab-wall``, of the lever that is limited most.
 
@@ -79,8 +92,7 @@ def _system(reason: str, level: str, *, machine_off: bool) -> str:
         return "machine off: not monitoring" if machine_off else "monitoring again"
     if level == "caution":  # it monitors, but something was amiss
         return _cut(reason, MAX_TEXT)
-    head = "NOT MONITORING: "
-    return head + _cut(reason, MAX_TEXT - len(head))
+    return _BLIND + _cut(reason, MAX_TEXT - len(_BLIND))
 
 
 def _when(time_s: float | None) -> str:

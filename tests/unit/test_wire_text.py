@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rampe_guard.wire import MAX_TEXT, alert_text
+from rampe_guard.wire import MAX_TEXT, alert_text, in_full
 
 
 @pytest.mark.parametrize(
@@ -46,6 +46,18 @@ def test_a_suppressed_alert_never_reads_as_clear() -> None:
     assert text == "bucket → cab-wall: machine off"
     text = alert_text(None, "no joystick", None, "clear", "system", machine_off=True)
     assert text == "machine off: not monitoring"
+
+
+@pytest.mark.parametrize("level", ["caution", "warning"])
+def test_a_log_tells_all_that_a_display_has_no_room_for(level: str) -> None:
+    reason = "guard restarted after a power loss or reboot; unseen: bucket at wall\n, arm at truck"
+    text = alert_text(None, reason, None, level, "system")
+    assert text.endswith("…")
+    assert "truck" not in text
+    head = "" if level == "caution" else "NOT MONITORING: "
+    assert in_full(text, reason) == head + reason.replace("\n", "?")
+    short = alert_text(None, "guard restarted after a kill", None, level, "system")
+    assert in_full(short, "guard restarted after a kill") == short
 
 
 def test_who_is_within_a_margin_is_not_clear_of_it() -> None:
