@@ -115,8 +115,14 @@ def _price(site: Site, tally: Tally, cycles: int, seed: int) -> str:
     contacts = sum(score.contacts for score in tally.scores(Level.WARNING).values())
     return (
         f"followed the advice: {contacts} contacts; a cycle took {took_s:.1f} s, with free levers"
-        f" {free_s:.1f} s ({100.0 * (took_s / free_s - 1.0):+.0f} %)"
+        f" {free_s:.1f} s ({more_words(took_s, free_s)})"
     )
+
+
+def more_words(took_s: float, free_s: float) -> str:
+    """How much more time one took than the other, in whole percent."""
+    percent = round(100.0 * (took_s / free_s - 1.0))
+    return f"{percent:+d} %" if percent else "0 %"
 
 
 @dataclass

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from rampe_guard import wire
 from rampe_guard.evaluate.tally import Tally
-from rampe_guard.programs.demo import _Score
+from rampe_guard.programs.demo import _Score, more_words
 from tests.support.messages import HEARTBEAT
 from tests.unit.test_score_referee import WallAtOne
 
@@ -41,3 +41,10 @@ def test_a_demo_knows_when_nobody_watched(beats: list[tuple[float, str]], blind_
         score.take([position(3.0)])
     assert score.tally.duration_s == pytest.approx(3.0)
     assert score.tally.blind_s == pytest.approx(blind_s)
+
+
+@pytest.mark.parametrize(
+    ("took_s", "words"), [(9.97, "0 %"), (10.03, "0 %"), (10.09, "+1 %"), (9.0, "-10 %")]
+)
+def test_no_difference_has_no_sign(took_s: float, words: str) -> None:
+    assert more_words(took_s, 10.0) == words
