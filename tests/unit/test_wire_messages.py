@@ -38,8 +38,8 @@ DESIGNED_ALERT = [
     "time_to_collision_s", "clearance_m", "clearance_now_m", "contact_point_m",
     "contact_fraction", "any_path", "category", "observations", "predicted_displacement",
     "predicted_endpoint", "similar_situations", "similar_contacts", "stamp", "published_unix_s",
-    "uptime_s", "input_age_s", "compute_ms", "raised_unix_s", "changed_unix_s", "acked_by", "shelved_by",
-    "shelved_until_unix_s", "expires_after_s", "text",
+    "uptime_s", "input_age_s", "compute_ms", "raised_unix_s", "changed_unix_s", "acked_by",
+    "shelved_by", "shelved_until_unix_s", "expires_after_s", "text",
 ]  # fmt: skip
 
 ALERT = Alert(
