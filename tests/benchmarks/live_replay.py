@@ -56,6 +56,7 @@ class Ear:
         self.loop_ms: wire.Quantiles | None = None
         self._beats = bus.inbox(f"{keys.base}/heartbeat", 64)
         self._levels: dict[str, str] = {}
+        self._newest_s: float | None = None
         self._run("rampe_guard", "run", site.path, "--connect", endpoint)
         self._wait_for_guard()
         self.player = self._run(
@@ -69,6 +70,7 @@ class Ear:
             sample = wire.decode_actuators(message.payload, self._site.actuator_names)
             assert sample.stamp is not None
             self.tally.position(sample.stamp, np.array(sample.position))
+            self._newest_s = sample.stamp
         for alert in _messages(self._alerts, wire.Alert):
             if alert.zone is None or alert.stamp is None:
                 continue
@@ -80,6 +82,9 @@ class Ear:
                 self.transitions.append((alert.zone, alert.level))
         for beat in _messages(self._beats, wire.Heartbeat):
             self.loop_ms = beat.loop_ms or self.loop_ms
+            if self._newest_s is not None:  # a heartbeat has no stamp of the log
+                monitoring = beat.status != "not_monitoring"
+                self.tally.status(self._newest_s, monitoring=monitoring)
         return self.player.poll() is None
 
     def _wait_for_guard(self) -> None:
