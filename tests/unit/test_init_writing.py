@@ -17,7 +17,8 @@ from rampe_guard.settings import load_site
 from tests.support import small_arm
 from tests.support.processes import Process, called
 
-END_S = 2.0
+END_S = 15.0
+"""Without a look at the signal it would never end; a busy machine takes seconds to let go."""
 
 
 def _init(folder: Path, out: Path, *more: str) -> tuple[int, str, str]:
