@@ -217,7 +217,7 @@ class _Reader:
     def _check_ends(self, element: Element, joint: str, lower: float, upper: float) -> None:
         if lower > upper:
             raise self._wrong(
-                element, f"{joint} has lower={lower:g} above upper={upper:g}; exchange them"
+                element, f"{joint} has lower={lower:g} above upper={upper:g}; correct them"
             )
         if math.isinf(lower) != math.isinf(upper) or lower == upper in (math.inf, -math.inf):
             raise self._wrong(

@@ -83,7 +83,7 @@ RING = link("c") + link("d") + joint("x", "fixed", "c", "d") + joint("y", "fixed
         (TWO.replace("0 0 1", "0 0"), r'<axis> has xyz="0 0"'),
         (TWO.replace('"-1"', '"nan"'), r"arm.urdf:3: joint 'turn' has lower=\"nan\"; give a num"),
         (TWO.replace('"2"', '"-nan"'), r"arm.urdf:3: joint 'turn' has upper=\"-nan\"; give a num"),
-        (TWO.replace('"2"', '"-2"'), r"urdf:3: joint 'turn' has lower=-1 above upper=-2; exchange"),
+        (TWO.replace('"2"', '"-2"'), r"urdf:3: joint 'turn' has lower=-1 above upper=-2; correct"),
         (TWO.replace('"-1"', '"-inf"'), r"urdf:3: joint 'turn' has lower=-inf and upper=2; give"),
         (TWO.replace('"1.5"', '"-1"'), r"arm.urdf:3: joint 'turn' has velocity=\"-1\"; give its"),
         (TWO.replace('"1.5"', '"nan"'), r"arm.urdf:3: joint 'turn' has velocity=\"nan\"; give its"),
