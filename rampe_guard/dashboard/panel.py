@@ -20,6 +20,8 @@ from rampe_guard.dashboard.places import Places
 from rampe_guard.errors import ConnectionFailedError
 
 PLACES = 4
+WIDTH_PX = 416
+"""As --rg-panel in style.css: 400 and the frame that says that nobody watches."""
 _SETTLED_S = 0.5
 """How long a place must have shown its alert before its buttons count [s]."""
 _BEAT_S = 0.3
@@ -96,7 +98,7 @@ class Panel:
         gui = client.gui
         self._theme(night=True)  # a bright screen blinds in a dark cab, a dark one nobody
         gui.main_panel.dock_right()
-        gui.main_panel.set_width(400)
+        gui.main_panel.set_width(WIDTH_PX)
         gui.add_html(markup.style())
         self._alive = Html(gui, markup.alive(0))
         self._banner = Html(gui)

@@ -160,6 +160,34 @@ def test_a_guard_that_dies_is_told_and_its_successor_is_taken_up_without_a_reloa
     assert "the guard restarted" in page.text
 
 
+@pytest.mark.parametrize("width", [1400, 1000])
+def test_the_frame_cuts_nothing_and_notes_cover_no_words(cab: Cab, width: int) -> None:
+    """There is room for the frame at any time: nothing moves when protection goes."""
+    page = cab.page
+    page.resize(width, 700)
+    try:
+        page.wait(f"{_FURTHEST} > 0 && {_FURTHEST} <= {width - 16}", SOON_S)
+        assert page.evaluate(_OVERLAP) == 0.0
+    finally:
+        page.resize(*SIZE)
+
+
+_FURTHEST = """Math.max(...[...document.querySelectorAll(
+    '.rg-bars td, .rg-card, .rg-event, .rg-foot, .mantine-Button-root, .mantine-Input-input'
+)].map(e => e.getBoundingClientRect().right))"""
+"""Right end of what is in the panel [px]."""
+_OVERLAP = """(() => {
+    const legend = document.querySelector('.rg-legend');
+    const before = legend.innerHTML;
+    legend.innerHTML = '<span>in 5 of 8 similar situations you went on to here</span>'.repeat(3);
+    const words = legend.getBoundingClientRect();
+    legend.innerHTML = before;
+    const notes = [...document.querySelectorAll('.mantine-Notifications-notification')];
+    return Math.max(0, ...notes.map(note => words.right - note.getBoundingClientRect().left));
+})()"""
+"""By how much a note of viser's would cover a sentence at the left of the scene [px]."""
+
+
 def test_each_page_chooses_its_machine(cab: Cab) -> None:
     choose(cab.page, "excavator-7")
     cab.page.wait(LOST, SOON_S)  # nobody guards that one

@@ -10,18 +10,22 @@ from PIL import Image
 
 from tests.support.browser import Page
 
-SIZE = (760, 440)
+SIZE = (776, 440)
 """Of the window [px]: software draws it."""
-PANEL = 400
+PANEL = 416
 TOP = 100
 BOTTOM = 60
 EDGE = 24
+_NO_NOTES = """document.querySelectorAll('.mantine-Notifications-root')
+    .forEach(notes => { notes.style.visibility = 'hidden'; })"""
+"""viser's notes stand in the scene, and are coloured."""
 
 
 class Scene:
-    """The scene of a page without banner, panel and what is written over it."""
+    """The scene of a page without banner, panel, notes and what is written over it."""
 
     def __init__(self, page: Page) -> None:
+        page.evaluate(_NO_NOTES)
         image = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
         rgb = np.asarray(image, dtype=np.int16)
         self.rgb: npt.NDArray[np.int16] = rgb[
