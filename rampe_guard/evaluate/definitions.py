@@ -63,8 +63,9 @@ DEFINITIONS: Final = {
     ),
     "interval": "2.5 % and 97.5 % of 1000 bootstrap samples of blocks of half a minute (seeded)",
     "reliability": (
-        "at every evaluation, of every zone that the arm is not in, and where the log goes on for"
-        " the horizon: the probability said, against whether the arm entered within the horizon"
+        "at every evaluation, of every zone that the arm is not in, and where the log goes on, and"
+        " the guard monitors, for the horizon: the probability said, against whether the arm"
+        " entered within the horizon"
     ),
     "rms": "root mean square error of the next displacement, in shares of the range",
 }

@@ -99,10 +99,8 @@ def _cards(report: Report) -> str:
         (str(report.published["caution"].total.missed), "without any alert before"),
     ]
     if report.not_monitoring_s > 0.0:
-        cards += [
-            (f"{report.not_monitoring_s:.1f} s", f"NOT MONITORING of {report.duration_s:.1f} s"),
-            (str(at.unmonitored), "crossings meanwhile, which no figure counts"),
-        ]
+        meanwhile = f"NOT MONITORING; crossings meanwhile, in no figure: {at.unmonitored}"
+        cards += [(f"{report.not_monitoring_s:.1f} s", meanwhile)]
     told = "".join(f"<li><b>{escape(a)}</b><span>{escape(b)}</span></li>" for a, b in cards)
     known = escape(f"Knowledge {report.knowledge}.")
     return f"<ul class='cards'>{told}</ul><p class='small'>{known}</p>"

@@ -239,7 +239,7 @@ def test_the_report_tells_when_the_guard_was_blind_and_where_the_arm_began(
     page = (tmp_path / "report.html").read_text("utf-8")
     assert f"NOT MONITORING {end - start:.1f} of" in told
     assert f"holed.csv: inside from the start, which counts as no crossing: {first} (" in told
-    assert "NOT MONITORING of" in page
+    assert "NOT MONITORING; crossings meanwhile" in page
     assert 'class="blind"' in page
     assert f"counts as no crossing: {first} (" in page
 

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from rampe_guard.core.alarm import Level
 from rampe_guard.evaluate.blindness import Blindness, blind_s
 from rampe_guard.evaluate.episodes import AlertSpan, Contact, inside_at_first_s
+from rampe_guard.evaluate.foretold import came
 from rampe_guard.evaluate.outcome import judge
 from rampe_guard.evaluate.points import figures, pool
 from rampe_guard.evaluate.score import LevelScore, score_zone, total
@@ -141,6 +142,14 @@ def test_how_long_an_arm_was_inside_from_the_first_position_on() -> None:
     assert inside_at_first_s(np.array([(2.0, np.inf)]), window) == pytest.approx(7.0)
     assert inside_at_first_s(np.array([(2.1, 5.0)]), window) is None
     assert inside_at_first_s(np.zeros((0, 2)), window) is None
+
+
+def test_nobody_is_asked_what_comes_while_he_is_blind() -> None:
+    time_s = np.array([1.0, 2.4, 2.6, 4.5, 5.0, 6.0])
+    contacts, blind = np.array([(4.2, 4.3), (6.5, 7.0)]), np.array([(3.5, 4.5)])
+    it_came, known = came(time_s, contacts, 1.0, 9.0, blind)
+    assert known.tolist() == [True, True, False, True, True, True]
+    assert it_came[known].tolist() == [False, False, False, False, True]
 
 
 def test_a_tally_knows_both() -> None:
