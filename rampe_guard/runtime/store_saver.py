@@ -67,12 +67,17 @@ class Saver(Generic[_Mark]):
             try:
                 self._file.write(save.content())
             except (ModelFileError, ValueError, MemoryError) as error:
-                self.failures += 1
-                self.problem = str(error) or type(error).__name__
-                self.taken = self._saved  # to be given again
+                self._failed(str(error) or type(error).__name__)
+            except Exception as error:  # noqa: BLE001 - else nothing would be kept, without a word
+                self._failed(repr(error))
             else:
                 self._saved = save.mark
                 self.problem = None
+
+    def _failed(self, problem: str) -> None:
+        self.failures += 1
+        self.problem = problem
+        self.taken = self._saved  # to be given again
 
     def _wait(self) -> Save[_Mark] | None:
         with self._changed:

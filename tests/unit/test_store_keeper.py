@@ -22,6 +22,7 @@ from rampe_guard.runtime.say import Sayer
 from rampe_guard.runtime.store import ModelFile, model_path
 from rampe_guard.runtime.store_format import Header, decode, encode
 from rampe_guard.runtime.store_keeper import Keeper
+from rampe_guard.runtime.store_saver import Save, Saver
 from rampe_guard.settings import Site
 from tests.support.models import bench_limits, bench_site, some_header
 from tests.support.processes import until
@@ -411,3 +412,23 @@ def test_leaving_the_context_saves(site: Site) -> None:
     assert header is not None
     assert header.occurrences == 1
     assert some_header(site).actuators == header.actuators
+
+
+def test_no_fault_ends_the_saving(tmp_path: Path) -> None:
+    """Not even one of ours, of which nobody has thought."""
+
+    def broken() -> bytes:
+        raise RuntimeError("dictionary changed size during iteration")
+
+    file = ModelFile(tmp_path / "model.npz")
+    file.lock()
+    saver = Saver(file, 0)
+    saver.give(Save(broken, 1))
+    until(lambda: saver.failures == 1, 5.0, "the fault counted")
+    assert "changed size" in (saver.problem or "")
+    assert saver.taken == 0
+    saver.give(Save(lambda: b"good", 2))
+    until(lambda: saver.problem is None, 5.0, "saved after all")
+    assert saver.finish(5.0)
+    file.release()
+    assert file.path.read_bytes() == b"good"
