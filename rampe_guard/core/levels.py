@@ -54,9 +54,10 @@ class LevelRules:
         if sweep.certificate is Certificate.FREE:
             return Evidence(self._near(sweep, shown, Level.IMMINENT), source, 0.0, None, sweep)
         if sweep.inside and not sweep.closing:
-            # who stands in an object is not clear of it; who leaves it is not alarmed anew
+            # who stands in an object, or past a limit, is not clear of it; who leaves it is not
+            # alarmed anew
             standing = not forecast.displacement.any()
-            held = sweep.touching and (bool(shown) or standing)
+            held = (sweep.touching or sweep.past_limit) and (bool(shown) or standing)
             level = Level.CAUTION if held else Level.CLEAR
             return Evidence(level, source, 0.0, None, sweep)
         time_s = forecast.time_at(sweep.contact_fraction or 0.0)

@@ -174,6 +174,11 @@ class ZoneSweep:
             return False
         return self.clearance_now_m <= -self.margin_m
 
+    @property
+    def past_limit(self) -> bool:
+        """The zone is an actuator limit, and the actuator is beyond it."""
+        return self.margin_m is None and (self.clearance_now_m or 0.0) < 0.0
+
 
 @dataclass(frozen=True, slots=True)
 class SweepResult:

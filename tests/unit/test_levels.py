@@ -133,3 +133,22 @@ def test_the_worst_evidence_is_the_most_urgent_then_the_soonest() -> None:
     never = Evidence(Level.WARNING, "intent", 0.9, None, None)
     assert worst([late, soon, never]) is soon
     assert worst([late, grave, soon]) is grave
+
+
+def beyond(now: float, *, closing: bool = False) -> ZoneSweep:
+    """The actuator stands so far from a limit's edge."""
+    return replace(zone(0.0, now=now, clearance=0.0, closing=closing), link=None, margin_m=None)
+
+
+def test_who_stands_past_a_limit_is_not_clear_of_it() -> None:
+    at_rest = StoppingForecast(0.0 * ONE, 0.0 * ONE, 0.0 * ONE, ONE, 0.2 * ONE)
+    for shown in (Level.CLEAR, Level.IMMINENT):
+        found = RULES.stopping(at_rest, beyond(-0.15), risk(0.0), shown)
+        assert found.level is Level.CAUTION
+    assert RULES.stopping(at_rest, beyond(0.0), risk(0.0), Level.CLEAR).level is Level.CLEAR
+
+
+def test_who_leaves_a_limit_keeps_its_alert_and_is_not_alarmed_anew() -> None:
+    assert stopping(beyond(-0.15), shown=Level.IMMINENT).level is Level.CAUTION
+    assert stopping(beyond(-0.15)).level is Level.CLEAR
+    assert stopping(beyond(-0.15, closing=True)).level is Level.IMMINENT
