@@ -60,14 +60,17 @@ def record(wishes: Wishes, stop: StopFlag) -> str:
 
     Raises:
         SettingsError: the site file is wrong.
-        LogError: nothing can be written where it is wanted.
+        LogError: nothing can be written where it is wanted, or nothing ever was.
     """
     say = Sayer("rampe_guard.record")
     site = for_operator(connect_to(load_site(wishes.site), wishes.connect), wishes.operator)
     clock, channels = Clock(), channels_of(site)
     beginning = _Beginning(site, gather(site), clock, say)
     rotation = Rotation.of(wishes.rotate_mb, wishes.rotate_minutes)
-    series = Series(Path(wishes.out), channels, beginning.head, rotation)
+    out = Path(wishes.out)
+    if out.exists() and not out.is_file():
+        raise LogError(f"{out}: is no file; give the name of one, such as day.mcap")
+    series = Series(out, channels, beginning.head, rotation)
     _first_file(series, say)
     bus = Bus.open_retrying(site.zenoh, stop, lambda text: say.warn("connect", text), stop.wait)
     if bus is None:
@@ -85,6 +88,8 @@ def record(wishes: Wishes, stop: StopFlag) -> str:
             return stop() or (until_s is not None and time.monotonic() >= until_s)
 
         ended = recorder.run(over, time.sleep)
+    if ended.dropped and not ended.messages:
+        raise LogError(f"nothing was recorded: {summary(ended, series.begun)}")
     return summary(ended, series.begun)
 
 

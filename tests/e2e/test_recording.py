@@ -26,7 +26,7 @@ from rampe_guard.runtime.stopping import StopFlag
 from rampe_guard.settings import load_site
 from tests.support import processes
 from tests.support.contract import Contract
-from tests.support.ears import Ears
+from tests.support.ears import Ears, open_session
 from tests.support.processes import Process, command
 from tests.support.recorded_work import machine, recorders, work, write_site
 from tests.support.tap import Tap
@@ -161,6 +161,33 @@ def test_a_full_disk_is_told_and_loses_nothing_if_it_passes(
     whole = McapReading(recorded.folder / "whole.mcap")
     wanted = [m.payload for m in whole.messages() if _is(m, "/actuators")]
     assert [p for p in got if p in set(wanted)] == wanted
+
+
+def test_of_nothing_that_was_recorded_the_exit_code_tells(tmp_path: Path) -> None:
+    site_path = write_site(tmp_path, absolute=True)
+    key, endpoint = load_site(site_path).keys.joystick, processes.free_endpoint()
+    out = tmp_path / "never.mcap"
+    args = ["-m", "rampe_guard", "record", str(site_path), str(out), "--for", "2"]
+    with (
+        processes.router(tmp_path, endpoint),
+        open_session(endpoint) as session,
+        Process(tmp_path, "record", [*args, "--connect", endpoint]) as recorder,
+    ):
+        resource.prlimit(recorder.pid, resource.RLIMIT_FSIZE, (_ROOM, 2**40))
+        deadline_s = time.monotonic() + 30.0
+        while recorder.alive and time.monotonic() < deadline_s:
+            session.put(key, b'{"axes": [0.0]}')
+            time.sleep(0.02)
+        assert recorder.popen.wait(5.0) == 2
+        assert "nothing was recorded: 0 messages" in recorder.err
+        assert "messages LOST" in recorder.err
+
+
+def test_what_is_no_file_is_not_written_beside(tmp_path: Path) -> None:
+    site_path = write_site(tmp_path, absolute=True)
+    done = command("record", site_path, "/dev/null")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "/dev/null: is no file" in done.stderr
 
 
 def test_a_site_with_a_wider_margin_is_warned_earlier(recorded: Recorded) -> None:
