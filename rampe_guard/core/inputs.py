@@ -122,9 +122,7 @@ class Continuity(Generic[S]):
             return self._accept(sample, self._clock)
         broken = self._break(self._good, sample, speed, self._clock)
         if broken is None:
-            # a sender whose clock was set back a little is waited for, and goes by its new clock
-            set_back = self._suspects >= _CLOCK_SET
-            return self._accept(sample, self._suspect_clock if set_back else self._clock)
+            return self._accept(sample, self._clock_now(sample, speed))
         if self._suspect is None or self._break(self._suspect, sample, speed, self._suspect_clock):
             self._suspect_since_s, self._suspects = sample.arrival_s, 0
             self._suspect_clock = SenderClock()
@@ -133,6 +131,13 @@ class Continuity(Generic[S]):
         if sample.arrival_s - self._suspect_since_s >= self._patience_s:
             return replace(self._accept(sample, self._suspect_clock), restarted=True)
         return broken
+
+    def _clock_now(self, sample: S, speed: FloatArray | None) -> SenderClock:
+        """A sender whose clock was set back a little was waited for, and goes by its new clock."""
+        if self._suspect is None or self._suspects < _CLOCK_SET:
+            return self._clock
+        other = self._break(self._suspect, sample, speed, self._suspect_clock)
+        return self._suspect_clock if other is None else self._clock
 
     def _accept(self, sample: S, clock: SenderClock) -> Accepted[S]:
         self._good, self._suspect, self._suspects = sample, None, 0

@@ -66,11 +66,11 @@ def test_the_last_words_are_what_is_to_do(tmp_path: Path) -> None:
     _, out, _ = _init(tmp_path, tmp_path)
     site = (tmp_path / "site.yaml").read_text()
     count = sum("TODO" in line for line in site.splitlines()[2:])
-    last = " ".join(out[out.rindex("first look at") :].split())
+    last = "".join(out[out.rindex("first look at") :].split())  # wherever a line was broken
     assert last == (
         f"first look at {count} lines marked TODO in {tmp_path / 'site.yaml'},"
         f" 1 line marked TODO in {tmp_path / 'scene.yaml'}; nothing was measured"
-    )
+    ).replace(" ", "")
 
 
 def test_what_was_heard_live_may_lie_in_the_folder(tmp_path: Path) -> None:

@@ -173,6 +173,17 @@ def test_a_clock_that_was_set_back_a_little_is_waited_for_and_gone_by() -> None:
     assert set(told[31:]) == {0.0}
 
 
+def test_what_is_refused_sets_nobody_elses_clock() -> None:
+    judge = gate()
+    prompt(judge)
+    for k in range(20):  # somebody else speaks with a clock of his own in between
+        now_s = 2.0 + 0.1 * k
+        others = [now_s + 3600.0 + 0.01 * i for i in range(4)]
+        arrivals = [now_s + 0.01 * i for i in range(4)]
+        assert fed(judge, others, arrivals) == ["stamp_jump"] * 4
+        assert fed(judge, [now_s + 0.05], [now_s + 0.05]) == [0.0]
+
+
 def test_one_out_of_order_is_no_other_clock() -> None:
     judge = gate()
     prompt(judge)
@@ -202,3 +213,17 @@ def test_who_started_anew_brings_a_clock_of_his_own() -> None:
     told = fed(judge, (arrivals - 3600.0).tolist(), arrivals.tolist())
     assert told[0] == "stamp_back"
     assert told[-1] == 0.0
+
+
+@pytest.mark.parametrize("glitch_s", [0.02, 0.3, 0.45, 0.9])
+def test_one_stamp_from_the_future_is_got_over(glitch_s: float) -> None:
+    judge = gate()
+    prompt(judge)
+    assert fed(judge, [2.0 + glitch_s], [2.0]) == [0.0]
+    arrivals = np.arange(2.01, 5.0, 0.01).tolist()
+    told = fed(judge, arrivals, arrivals)
+    assert set(told[:1]) == {"stamp_back"}
+    assert told[-1] == pytest.approx(0.0, abs=0.02)
+    assert [late for late in told if late != "stamp_back"] == pytest.approx(
+        [0.0] * (len(told) - told.count("stamp_back")), abs=0.021
+    )
