@@ -104,7 +104,9 @@ def moved(page: Page, before: Scene) -> bool:
 
 def test_an_alert_turns_banner_and_object_and_is_acknowledged_from_the_page(cab: Cab) -> None:
     page = cab.page
-    assert Scene(page).red() < LEAST_RED
+    # the swing before this came near the crate: what it raised must be over, and be drawn so
+    page.wait("!document.querySelector('.rg-banner.rg-imminent')", SOON_S)
+    until(lambda: Scene(page).red() < LEAST_RED, SOON_S, "a crate that is not red")
     start_s = time.monotonic()
     cab.station.press_on_crate()
     page.wait("!!document.querySelector('.rg-banner.rg-imminent.rg-flash')", SOON_S)
