@@ -17,6 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from rampe_guard import wire
+from rampe_guard.client.items import Protection
 from rampe_guard.core.sender_clock import SenderClock
 
 COMPLETE_S = 0.5
@@ -66,14 +67,36 @@ def sent_s(
     return contact, max(by_wall_s, uptime.measured_s(message.uptime_s, now_s))
 
 
-def beaten(contact: Contact, beat_s: float, now_s: float, *, lost: bool) -> Contact:
-    """After a heartbeat that was sent at ``beat_s`` [s].
+def beaten(
+    contact: Contact, message: wire.Heartbeat, now_s: float, expires_after_s: float, *, lost: bool
+) -> Contact:
+    """After a heartbeat that came now; an old one does not bring contact back.
 
     Args:
         contact: before it.
-        beat_s: as `sent_s` tells.
+        message: the heartbeat.
         now_s: now [s].
-        lost: contact was lost until it came, and it is fresh.
+        expires_after_s: age at which it is too old [s].
+        lost: contact was lost until it came.
     """
+    contact, beat_s = sent_s(contact, message, now_s)
     newest_s = beat_s if contact.beat_s is None else max(beat_s, contact.beat_s)
-    return replace(contact, beat_s=newest_s, since_s=now_s if lost else contact.since_s)
+    regained = lost and now_s - beat_s <= expires_after_s
+    return replace(contact, beat_s=newest_s, since_s=now_s if regained else contact.since_s)
+
+
+def told_all(contact: Contact, now_s: float, expires_after_s: float) -> Contact:
+    """After the guard has told its state, unless that is too old itself."""
+    silent = contact.silent(now_s, expires_after_s)
+    return contact if silent else replace(contact, since_s=None)
+
+
+def pending(now: Protection, told: Protection | None, *, known: bool) -> bool:
+    """Whether to wait a moment before telling that protection is not available.
+
+    Args:
+        now: what protection is.
+        told: what it was when that was told last. Who was told that all is well is told at once.
+        known: contact is complete, or plainly lost: no moment will show more.
+    """
+    return now is Protection.UNAVAILABLE and not known and not (told and told.guarded)

@@ -25,7 +25,7 @@ from types import MappingProxyType
 from typing import TypeAlias
 
 from rampe_guard import wire
-from rampe_guard.client.contact import beaten, sent_s
+from rampe_guard.client.contact import beaten, pending, sent_s, told_all
 from rampe_guard.client.items import (
     Alert,
     GuardRestarted,
@@ -119,8 +119,8 @@ def on_state(fleet: Fleet, base: str, message: wire.State, now_s: float, asked_s
         return fleet, ()
     machine, items = met
     machine = _beat(machine, message.heartbeat, now_s)
-    if not machine.silent:
-        machine = replace(machine, contact=replace(machine.contact, since_s=None))
+    contact = told_all(machine.contact, now_s, machine.expires_after_s)
+    machine = replace(machine, contact=contact)
     for found in message.alerts:
         known = _known(machine, found.alert_id)
         if found.alert_id in machine.memory.ended or (known is not None and known.seq > found.seq):
@@ -235,17 +235,17 @@ def _dated(machine: MachineState, message: wire.Alert, now_s: float) -> tuple[Ma
 
 
 def _beat(machine: MachineState, message: wire.Heartbeat, now_s: float) -> MachineState:
-    contact, beat_s = sent_s(machine.contact, message, now_s)
-    lost = machine.silent and now_s - beat_s <= machine.expires_after_s
+    expires_s, lost = machine.expires_after_s, machine.silent
+    contact = beaten(machine.contact, message, now_s, expires_s, lost=lost)
     known = machine.heartbeat
     if known is not None and known.boot_id == message.boot_id and known.seq > message.seq:
         message = known
     return replace(
         machine,
         heartbeat=message,
-        contact=beaten(contact, beat_s, now_s, lost=lost),
+        contact=contact,
         gone=False,
-        behind=machine.behind or lost,
+        behind=machine.behind or not contact.complete(now_s),
     )
 
 
@@ -297,10 +297,8 @@ def _tell(machine: MachineState) -> tuple[MachineState, tuple[Item, ...]]:
     if machine.heartbeat is None:
         waiting = machine.now_s - machine.first_s < machine.expires_after_s
     else:
-        # in a moment it is known what to tell; who was told that all is well is told at once
         known = machine.silent or machine.told_all
-        told = machine.memory.told
-        waiting = now is Protection.UNAVAILABLE and not known and not (told and told.guarded)
+        waiting = pending(now, machine.memory.told, known=known)
     if now is machine.memory.told or waiting:
         return machine, ()
     machine = replace(machine, memory=replace(machine.memory, told=now))

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from rampe_guard.client.contact import beaten, sent_s
+from rampe_guard.client.contact import beaten, pending, sent_s, told_all
 from rampe_guard.client.items import Protection
 from rampe_guard.client.machine import STATUS
 from rampe_guard.core.alarm import Level
@@ -114,10 +114,8 @@ def on_prediction(state: ViewState, message: Prediction, now_s: float) -> ViewSt
 
 def on_heartbeat(state: ViewState, message: Heartbeat, now_s: float) -> ViewState:
     """Show health; a guard that restarted takes its old alerts with it."""
-    before, lost = state.health, state.silent
-    contact, beat_s = sent_s(state.contact, message, now_s)
-    regained = lost and now_s - beat_s <= state.expires_after_s
-    contact = beaten(contact, beat_s, now_s, lost=regained)
+    before, expires_s = state.health, state.expires_after_s
+    contact = beaten(state.contact, message, now_s, expires_s, lost=state.silent)
     health = HealthView(
         protection=_protection(message),
         reasons=tuple(reason.text for reason in message.reasons),
@@ -158,8 +156,8 @@ def on_alert(state: ViewState, message: Alert, now_s: float) -> ViewState:
 def on_state(state: ViewState, message: State, now_s: float) -> ViewState:
     """Catch up, for a viewer that comes late."""
     state = on_heartbeat(state, message.heartbeat, now_s)
-    if not state.silent:
-        state = _tell(replace(state, contact=replace(state.contact, since_s=None)))
+    contact = told_all(state.contact, now_s, state.expires_after_s)
+    state = _tell(replace(state, contact=contact))
     for alert in message.alerts:
         state = on_alert(state, alert, now_s)
     for prediction in message.predictions:
@@ -224,8 +222,7 @@ def _tell(state: ViewState) -> ViewState:
         waits = state.began_s is not None and state.now_s - state.began_s <= state.expires_after_s
     else:
         known = state.silent or state.contact.complete(state.now_s)
-        # in a moment it is known what to tell; who was told that all is well is told at once
-        waits = now is Protection.UNAVAILABLE and not known and not (told and told.guarded)
+        waits = pending(now, told, known=known)
     if waits or now is told:
         return state
     state = replace(state, told=now)
